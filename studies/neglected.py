@@ -74,7 +74,7 @@ class Common:
             names.append(name)
 
         for body, label in (("dish", "dish"), ("arm", "arm")):
-            points = [n for n, p in network.places.items() if p.body == body and (body == "dish" or p.kind == "ranger")]
+            points = [n for n, p in network.places.items() if p.body == body and (body == "dish" or p.kind is None)]
             at = np.array([layout.columns(n) for n in points])
             for i, axis in enumerate(("east", "north", "up")):
                 add(f"{label} {axis}", dict.fromkeys(at[:, i].tolist(), 1.0 / len(at)))
@@ -166,7 +166,7 @@ class Night:
         self.half = 0.5 * SPEED_OF_LIGHT / self.campaign.site.ranging.modulation_hz
         self.per_radian = -self.half / TWO_PI
         spots = [network.places[t] for t in self.target]
-        self.prism = np.array([s.kind == "prism" for s in spots])
+        self.prism = np.array([s.normal is not None for s in spots])
         self.constant = np.array([s.constant for s in spots])
         self.body = np.array([s.body for s in spots])
         self.own_body = np.array([network.places[r].body for r in self.ranger])

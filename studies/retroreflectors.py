@@ -19,6 +19,7 @@ from catseye.optics.glass import group_index, index_over_air
 from catseye.optics.ray_trace import Plane, beam, corner, half_path, through_prism
 from catseye.optics.retroreflector import dihedral, prism
 from catseye.optics.retroreflector.cats_eye import focal_radius
+from catseye.optics.retroreflector.kinds.ball import silvered
 
 HEIGHT, APERTURE = 0.0381, 0.0254  # m
 SEED, RAYS = 1, 200_000
@@ -74,7 +75,7 @@ def cylinder(phase: float) -> None:
 
 def balls() -> None:
     """The memo's ball for beams of several widths."""
-    ball = replace(Dimensions().targets()[2], aperture=0.03)
+    ball = replace(silvered(Dimensions().sizes()), aperture=0.03)
     focus = float(focal_radius(ball.r1, ball.phase))
     say(f"paraxial focus {focus / 0.0254:.3f} inch; the memo has {ball.r2 / 0.0254:.3f}")
     say("stop of 30 mm radius, which no such beam fills")

@@ -21,10 +21,13 @@ if TYPE_CHECKING:
     from catseye.api.network import adjust, compare, locate, plan
     from catseye.api.night import explain, night, reduce
     from catseye.api.optics import beam, glass, link, safety
+    from catseye.api.pointing import fit_pointing, predict_pointing
+    from catseye.api.pose import pose
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.steering import point, track
-    from catseye.api.telescope import pose, surface
+    from catseye.api.telescope import surface
+    from catseye.api.track_profile import track_pointing
     from catseye.api.weather import air, sound
 
 FACE = {  # file of catseye.api -> its exported names
@@ -35,10 +38,13 @@ FACE = {  # file of catseye.api -> its exported names
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
+    "pointing": ("fit_pointing", "predict_pointing"),
+    "pose": ("pose",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "steering": ("point", "track"),
-    "telescope": ("pose", "surface"),
+    "telescope": ("surface",),
+    "track_profile": ("track_pointing",),
     "weather": ("air", "sound"),
 }
 
@@ -60,6 +66,7 @@ __all__ = [
     "compare",
     "examples",
     "explain",
+    "fit_pointing",
     "glass",
     "link",
     "load",
@@ -68,6 +75,7 @@ __all__ = [
     "plan",
     "point",
     "pose",
+    "predict_pointing",
     "reduce",
     "refractometer",
     "replay",
@@ -79,6 +87,7 @@ __all__ = [
     "sound",
     "surface",
     "track",
+    "track_pointing",
     "triplet",
 ]
 

@@ -690,7 +690,7 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1017/CBO9781139644181",
         used="section 1.4.2, eqs. 29, 30, 43: Stokes' parameters; section 1.5.2, eq. 21: Fresnel's formulae; section "
         "1.5.4, eq. 61: phases of total reflection; section 14.2, eq. 13: metals (`optics.polarization`); the same "
-        "formulae squared, for the faces of a retroreflector (`optics.retroreflector.kinds`)",
+        "formulae squared, for the faces of a retroreflector (`optics.retroreflector.interface`)",
     ),
     "JCGM106": Source(
         title="JCGM, Evaluation of measurement data: The role of measurement uncertainty in conformity "

@@ -261,7 +261,8 @@ def test_millimetres_are_located_and_pointed_at_as_metres():
     np.testing.assert_allclose(there.x, [target], atol=1e-9)
     np.testing.assert_allclose(there.covariance, catseye.locate(stations, ranges, 1e-4).covariance, rtol=1e-9)
     records = ("night-01/monuments/ZY103.toml", "night-01/mirrors/ZP103.toml")
-    pointed = catseye.point(*records, [[0.0, 0.0, 50_000.0]] * u.mm, posture_deg=[0.5, 1.0] * u.rad)
+    more = {"posture_deg": [0.5, 1.0] * u.rad, "solids": "solids.toml"}
+    pointed = catseye.point(*records, [[0.0, 0.0, 50_000.0]] * u.mm, **more)
     np.testing.assert_array_equal(pointed.counts, catseye.point(*records, [0.0, 0.0, 50.0]).counts)
 
 

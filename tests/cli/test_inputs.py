@@ -4,13 +4,16 @@ import json
 import os
 import subprocess
 import sys
+from typing import Annotated
 
 import pytest
+import typer
 
 from catseye.cli import terminal
 from catseye.cli.commands import SUBJECTS, app
-from catseye.cli.inputs import OUTPUTS, WRITTEN, paths_of
-from catseye.cli.terminal import ProgressLine
+from catseye.cli.inputs import OUTPUTS, WRITTEN, paths_of, prepare
+from catseye.cli.terminal import ProgressLine, attempt
+from catseye.errors import ArgumentError
 from catseye.gateways.plots import plot_passages
 from command_scene import COMMAND, command_line
 
@@ -133,17 +136,34 @@ def test_python_m_catseye_is_catseye():
     assert "catseye air" in done.stderr
 
 
+def test_a_refusal_names_the_options_as_the_command_spells_them(capsys):
+    """Parameters whose option has another name, and an argument by its name in the help."""
+    app = typer.Typer()
+
+    @app.command()
+    def work(
+        table: Annotated[str, typer.Argument(metavar="TABLE.csv")],
+        since: Annotated[float, typer.Option("--from")],
+        u_range_mm: Annotated[float, typer.Option()] = 1.0,
+    ) -> None:
+        raise ArgumentError("table, since and u_range_mm do not fit", "table", "since", "u_range_mm")
+
+    prepare(app)
+    command = typer.main.get_command(app)
+    assert attempt(lambda: command.main(["a", "--from", "1"], standalone_mode=False)) == 2
+    assert capsys.readouterr().err == "catseye: TABLE.csv, --from and --u-range-mm do not fit\n"
+
+
 class Clock:
     def __init__(self, monkeypatch):
         self.now = 0.0
         monkeypatch.setattr(terminal.time, "monotonic", lambda: self.now)
 
 
-def progress(monkeypatch, capsys, arguments=()):
+def progress(monkeypatch, capsys, json=False):
     """What 100 steps of half a second each say on a stderr that is no terminal."""
     clock = Clock(monkeypatch)
-    monkeypatch.setattr(sys, "argv", ["catseye", *arguments])
-    line = ProgressLine(quiet=False)
+    line = ProgressLine(quiet=False, json=json)
     for k in range(100):
         clock.now = 0.5 * k
         line("measuring on paper", k, 100)
@@ -162,7 +182,7 @@ def test_long_work_says_plain_lines_with_an_end_where_stderr_is_no_terminal(monk
 
 
 def test_a_program_that_reads_json_hears_nothing(monkeypatch, capsys):
-    assert progress(monkeypatch, capsys, ["--json"]) == []
+    assert progress(monkeypatch, capsys, json=True) == []
 
 
 def test_a_terminal_sees_one_line_with_the_end_foretold(monkeypatch, capsys):

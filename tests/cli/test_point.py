@@ -174,7 +174,7 @@ def test_without_uncertainties_u_is_unknown_and_with_them_it_is_given(catseye, t
         (
             ["--to=1,2,3", "--at", "52892.5", "--latitude-deg", "138", "--longitude-deg", "0"],
             1,
-            "--latitude-deg 138 is outside -90 to 90 (degrees)",
+            "latitude_deg = 138 is outside -90 to 90 (degrees)",
         ),
     ],
 )

@@ -4,8 +4,10 @@ import io
 import threading
 
 import pytest
+import typer
 
 from catseye.cli import terminal
+from catseye.cli.inputs import prepare
 from catseye.cli.terminal import ProgressLine, attempt, complain, wrapped
 from catseye.errors import InputError
 
@@ -50,7 +52,6 @@ def test_a_step_that_says_nothing_is_named_again_with_its_time(monkeypatch, show
     """The page is the longest step, and one call: whoever waits reads what for and how long already."""
     stream = Listener(wanted, shown)
     monkeypatch.setattr("sys.stderr", stream)
-    monkeypatch.setattr("sys.argv", ["catseye"])
     for name, seconds in (("BEAT", 0.001), ("SURE", 0.01), ("FIRST_LINE", 0.02), ("BETWEEN_LINES", 0.02)):
         monkeypatch.setattr(terminal, name, seconds)
     progress = ProgressLine(quiet=False)
@@ -67,6 +68,36 @@ def test_progress_is_silent_elsewhere_or_when_asked(monkeypatch, stream, quiet):
     progress("adjustment", 0, 6)
     progress.clear()
     assert stream.getvalue() == ""
+
+
+@pytest.mark.parametrize("json", [True, False])
+def test_no_plain_line_of_progress_with_json_of_the_running_command(monkeypatch, json):
+    """The command's own option counts, not the process's words."""
+    stream, app = io.StringIO(), typer.Typer()
+    monkeypatch.setattr("sys.stderr", stream)
+    monkeypatch.setattr("sys.argv", ["catseye", "--json"])
+    monkeypatch.setattr(terminal, "FIRST_LINE", 0.0)
+
+    @app.command()
+    def work(*, json: bool = False) -> None:
+        progress = ProgressLine(quiet=False)
+        progress("adjustment", 1, 6)
+        progress.clear()
+
+    prepare(app)
+    typer.main.get_command(app).main(["--json"] * json, standalone_mode=False)
+    assert stream.getvalue() == "" if json else "adjustment 1 of 6\n"
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_json_silences_plain_lines_and_no_terminal(monkeypatch, shown):
+    stream = Terminal() if shown else io.StringIO()
+    monkeypatch.setattr("sys.stderr", stream)
+    monkeypatch.setattr(terminal, "FIRST_LINE", 0.0)
+    progress = ProgressLine(quiet=False, json=True)
+    progress("adjustment", 1, 6)
+    progress.clear()
+    assert ("adjustment 1/6" in stream.getvalue()) == shown
 
 
 def test_a_complaint_is_one_printable_line(capsys):

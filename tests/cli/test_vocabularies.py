@@ -5,7 +5,6 @@ from typing import get_args
 import pytest
 import typer
 
-from catseye.api.telescope import CARRIED
 from catseye.atmosphere.index import air
 from catseye.atmosphere.sound import speed
 from catseye.cli import vocabularies
@@ -20,6 +19,7 @@ from catseye.gateways.journal.export import Form
 from catseye.gateways.surface.inputs import Frame
 from catseye.geometry.antenna import pointing_series
 from catseye.optics import zernike
+from catseye.optics.retroreflector.kinds import registry
 from catseye.optics.safety import limits
 from catseye.ranger import addresses
 from catseye.records.site.target import FrameName
@@ -28,7 +28,7 @@ from catseye.reduction.calibrations.field_report import FORMS
 from catseye.reduction.network import adjusted
 from catseye.reduction.pose import pointing_offsets
 from catseye.reduction.pose import pose as pose_recipe
-from catseye.reduction.steering.visibility import ACCEPTANCE
+from catseye.reduction.pose.findings import CARRIED
 from catseye.reduction.structure.series import Own
 from catseye.reduction.surface.actuators import Travel
 from catseye.service import settings, world
@@ -39,7 +39,7 @@ SOURCES = {
     "SOUND_MODELS": speed.MODELS,
     "THERMOMETRY_MODELS": reversed(speed.MODELS),
     "EDITIONS": limits.EDITIONS,
-    "REFLECTORS": ACCEPTANCE,
+    "REFLECTORS": registry.KINDS,
     "CALIBRATION_KINDS": kinds.KINDS,
     "REPORT_KINDS": FORMS,
     "DATUMS": datum.DATUMS,

@@ -247,27 +247,73 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 
 
 ONE_CALL = [
-    *("acoustic", "air", "baseline", "beam", "calibrate", "certificate", "explain", "glass", "link", "night", "plan"),
-    *("reduce", "refractometer", "replay", "safety", "sound", "triplet"),
+    "acoustic",
+    "air",
+    "baseline",
+    "beam",
+    "calibrate",
+    "certificate",
+    "explain",
+    "glass",
+    "link",
+    "night",
+    "plan",
+    "point",
+    "pointing fit",
+    "pointing predict",
+    "pointing track",
+    "pose",
+    "reduce",
+    "refractometer",
+    "replay",
+    "safety",
+    "sound",
+    "triplet",
 ]
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
+OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
 
 
-def signatures(name):
+def callbacks():
+    """Function of each command by its words; of a group's, "group command"."""
+    groups = [("", app), *((f"{group.name} ", group.typer_instance) for group in app.registered_groups)]
+    return {
+        prefix + (command.name or command.callback.__name__.replace("_", "-")): command.callback
+        for prefix, instance in groups
+        for command in instance.registered_commands
+    }
+
+
+def python_name(words):
+    """Function of catseye that is a command: `pointing fit` is `fit_pointing`."""
+    return "_".join(reversed(words.split())).replace("-", "_")
+
+
+def signatures(words):
     """Parameters of a command, and of its function."""
-    command = next(each.callback for each in app.registered_commands if each.callback.__name__ == name)
-    return inspect.signature(command).parameters, inspect.signature(getattr(catseye_package, name)).parameters
+    function = getattr(catseye_package, python_name(words))
+    return inspect.signature(callbacks()[words]).parameters, inspect.signature(function).parameters
 
 
-@pytest.mark.parametrize("name", ONE_CALL)
-def test_function_takes_every_option_of_its_command(name):
-    options, parameters = signatures(name)
-    assert set(options) - OF_THE_TERMINAL - WRITTEN <= set(parameters)
+def test_a_command_of_a_group_has_its_verb_first_in_python():
+    assert (python_name("air"), python_name("pointing fit")) == ("air", "fit_pointing")
+    assert set(ONE_CALL) <= set(callbacks())
 
 
-@pytest.mark.parametrize("name", ONE_CALL)
-def test_function_has_the_defaults_of_its_command(name):
-    options, parameters = signatures(name)
+@pytest.mark.parametrize("words", ONE_CALL)
+def test_function_takes_every_option_of_its_command(words):
+    options, parameters = signatures(words)
+    renamed = OTHER_NAMES.get(words, {})
+    assert {renamed.get(option, option) for option in set(options) - OF_THE_TERMINAL - WRITTEN} <= set(parameters)
+
+
+@pytest.mark.parametrize("words", ONE_CALL)
+def test_function_has_the_defaults_of_its_command(words):
+    options, parameters = signatures(words)
     defaults = {key: options[key].default for key in set(options) & set(parameters) - OF_THE_TERMINAL}
-    stated = {key: value for key, value in defaults.items() if isinstance(value, bool | int | float | str)}
+    stated = {
+        key: value
+        for key, value in defaults.items()
+        if isinstance(value, bool | int | float | str) and parameters[key].default is not None
+    }
     assert stated == pytest.approx({key: parameters[key].default for key in stated})

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from catseye.errors import InputError
+from catseye.names import SINGLE_RETROREFLECTORS
 from catseye.records.night.campaign import read_campaign
 from repository import ROOT
 
@@ -28,6 +29,7 @@ TEXT_FILES = (
     "weather.csv",
     "shots.csv",
 )
+SINGLE_KINDS = " or ".join([", ".join(map(repr, SINGLE_RETROREFLECTORS[:-1])), repr(SINGLE_RETROREFLECTORS[-1])])
 Damage = Callable[[Path], None]
 
 
@@ -279,7 +281,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "unknown type of target": (
         set_key("targets.toml", "type", '"cube"'),
-        "target['DP001'].type = 'cube' (expected 'prism' or 'hollow')",
+        f"target['DP001'].type = 'cube' (expected {SINGLE_KINDS})",
     ),
     "prism without a normal": (drop_key("targets.toml", "normal"), "target['DP001']: normal is missing (expected for"),
     "hollow with glass": (

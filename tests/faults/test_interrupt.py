@@ -134,7 +134,7 @@ def test_atomic_steps_are_not_interrupted(tmp_path):
     code = (
         "import os, signal, sys\n"
         "from pathlib import Path\n"
-        "from catseye.gateways.writers.interruption import deferred, exit_on_signals, undo_on_interruption\n"
+        "from catseye.interruption import deferred, exit_on_signals, undo_on_interruption\n"
         "exit_on_signals()\n"
         "with undo_on_interruption(Path(sys.argv[1], 'undone').touch):\n"
         "    with deferred():\n"
@@ -150,7 +150,7 @@ def test_atomic_steps_are_not_interrupted(tmp_path):
 def test_atomic_steps_cannot_delay_an_interrupt_forever():
     code = (
         "import os, signal\n"
-        "from catseye.gateways.writers import interruption\n"
+        "from catseye import interruption\n"
         "interruption.LONGEST_DEFERRAL = 0.05\n"
         "interruption.exit_on_signals()\n"
         "with interruption.deferred():\n"
@@ -195,7 +195,7 @@ def held(out, code):
     return process
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_within_a_call_that_runs_no_handler(tmp_path, number):
     """The supervisor ends what cannot hear, and removes what it had half-made."""
     out = tmp_path / "work" / "out"
@@ -234,7 +234,7 @@ def test_workers_end_with_a_killed_supervisor(tmp_path):
 
 def test_interrupted_rename_of_a_directory_is_undone(tmp_path):
     """What the supervisor heard: begun, and ended where it is done; said in pieces as a pipe may cut them."""
-    from catseye.gateways.writers.interruption import Unfinished, UnfinishedWork
+    from catseye.interruption import Unfinished, UnfinishedWork
 
     place = {name: tmp_path / name for name in ("fresh", "where", "old", "file", "done")}
     for name in ("fresh", "old", "done"):

@@ -217,6 +217,7 @@ def test_killed_coordinator_and_rangers_lose_and_duplicate_nothing(tmp_path):
     assert max(times["processor until ready"]) < UP  # by the clock on the wall it counts what others do meanwhile
 
 
+@pytest.mark.slow  # the server alone is killed in test_journal_killed.py, the site with a file above
 def test_killed_database_loses_and_duplicates_nothing(server, tmp_path):
     _, (acknowledged, stored, runs, _) = killed(
         server.database("system"), tmp_path, ["outage", "coordinator", "backend", "database"], seed=2, server=server

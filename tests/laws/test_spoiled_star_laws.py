@@ -14,7 +14,6 @@ from catseye.errors import InputError
 from catseye.geometry.antenna.pointing_series import PUBLISHED_ARCSEC, TERMS, PointingSeries
 from catseye.records.laboratory.star_offsets import parsed
 from catseye.reduction.pose.pointing_fit import fit_pointing
-from catseye.reduction.pose.verdicts import fit_verdict
 
 LEANING = (-284.0, -180.0, 80.0, 9.0, 71.0, 39.0, 31.0, 6.0)  # an axis that leans by a minute of arc
 HOUR = 15.0
@@ -64,7 +63,7 @@ def fitted(rows):
 def test_a_spoiled_table_is_never_good_while_its_terms_are_five_u_off(terms, seed):
     rows = table(seed, terms, noise=5.2)
     honest = fitted(rows)
-    assert fit_verdict(honest).word == "good"
+    assert honest.verdict.word == "good"
     wrong = []
     for name, spoil in SPOILED.items():
         try:
@@ -73,7 +72,7 @@ def test_a_spoiled_table_is_never_good_while_its_terms_are_five_u_off(terms, see
             continue
         u = np.sqrt(np.maximum(np.diag(fit.series.covariance), np.diag(honest.series.covariance)))
         off = np.abs(fit.series.values - honest.series.values) / u
-        if fit_verdict(fit).word == "good" and off.max() > 5.0:
+        if fit.verdict.word == "good" and off.max() > 5.0:
             wrong.append(f"{name}: {off.max():.1f} u")
     assert not wrong
 
@@ -81,7 +80,7 @@ def test_a_spoiled_table_is_never_good_while_its_terms_are_five_u_off(terms, see
 @pytest.mark.parametrize(("columns", "said"), [((0, 2), "azimuths of sky and"), ((1, 3), "elevations of sky and")])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_leaning_axis_shows_that_sky_and_encoders_are_exchanged(columns, said, seed):
-    found = fit_verdict(fitted(exchanged(table(seed, LEANING, noise=5.2), *columns)))
+    found = fitted(exchanged(table(seed, LEANING, noise=5.2), *columns)).verdict
     assert found.word == "doubtful"
     assert said in found.why
 
@@ -89,4 +88,4 @@ def test_a_leaning_axis_shows_that_sky_and_encoders_are_exchanged(columns, said,
 @pytest.mark.parametrize("seed", range(40))
 def test_honest_tables_of_any_telescope_stay_good(seed):
     rng = np.random.default_rng(seed)
-    assert fit_verdict(fitted(table(seed, rng.normal(0, 300, 8), noise=rng.uniform(0.5, 15)))).word == "good"
+    assert fitted(table(seed, rng.normal(0, 300, 8), noise=rng.uniform(0.5, 15))).verdict.word == "good"

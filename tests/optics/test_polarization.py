@@ -29,7 +29,7 @@ from catseye.optics.retroreflector.corner_polarization import (
     solid_corner,
     through_plate,
 )
-from catseye.optics.retroreflector.kinds import fresnel
+from catseye.optics.retroreflector.interface import fresnel
 
 GOLD = 0.15 + 4.7j  # near 780 nm; any metal serves these tests
 PERFECT = complex("inf")

@@ -7,7 +7,8 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.estimation.shapes.pose import PlaceCovariances, fit_pose
 from catseye.geometry.antenna.pointing_series import TERMS, published
 from catseye.records.laboratory.tilts import TiltReadings
-from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
+from catseye.reduction.pose.pointing_fit import fit_pointing
+from catseye.reduction.pose.series_comparison import compare_series
 from catseye.reduction.pose.track_profile import joined_tilt, track_profile
 from draws import draws
 

@@ -13,6 +13,7 @@ from catseye.api.reading import place_of
 from catseye.api.result import Result, SinglePage, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import PPM
+from catseye.names import AIR_MODEL
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -101,7 +102,7 @@ class AcousticResult(Result):
 
     def pages(self) -> dict[str, SinglePage]:
         """`table`: path_temperatures.csv, as a campaign reads it."""
-        from catseye.gateways.air.acoustic_objects import MARK, path_temperatures_csv
+        from catseye.gateways.air.tables import MARK, path_temperatures_csv
 
         return {"table": SinglePage(MARK, lambda now, path: path_temperatures_csv(self.reduction.paths))}
 
@@ -124,7 +125,7 @@ def acoustic(
     *files: "str | os.PathLike[str]",
     sheet: "str | os.PathLike[str] | None" = None,
     model: str = "real_gas",
-    air_model: str = "ciddor_hill1999",
+    air_model: str = AIR_MODEL,
     progress: Progress | None = None,
 ) -> AcousticResult:
     """Temperature of the air along paths from the travel time of sound.

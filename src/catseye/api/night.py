@@ -79,7 +79,7 @@ class NightResult(Result):
 
     def tables(self) -> "dict[str, QTable]":
         """`points`: a row a point; `ranges`: a row a shot that was adjusted; `surface`: a row a prism of the dish."""
-        from catseye.gateways.epoch.tables import kinds_of
+        from catseye.gateways.epoch.tables import RANGES, SURFACE, PrismRows, ShotRows, kinds_of
 
         own = self.reduction.coordinates.joint.blocks
         points = {
@@ -91,26 +91,13 @@ class NightResult(Result):
             "shots": (self.shots, ""),
         }
         ranges = self.reduction.coordinates.ranges
-        shots = {
-            "shot": (self.reduction.campaign.shots.shot[ranges.shot], ""),
-            "ranger": (ranges.ranger, ""),
-            "target": (ranges.target, ""),
-            "range": (ranges.range_, "m"),
-            "u_range": (ranges.u_range / MILLIMETRE, "mm"),
-            "residual": (ranges.residual / MILLIMETRE, "mm"),
-            "standardised": (ranges.standardised, ""),
-            "used": (ranges.used, ""),
-        }
+        names = ("shot", "ranger", "target", "range_m", "u_range_mm", "residual_mm", "standardised")
+        shots = RANGES.quantities(ShotRows(self.reduction), names, rows=ranges.shot) | {"used": (ranges.used, "")}
         tables = {"points": quantities(points, frame="ground"), "ranges": quantities(shots)}
         surface = self.reduction.surface
         if surface is not None:
-            tables["surface"] = quantities(
-                {
-                    "point": (surface.names, ""),
-                    "deviation": (surface.fit.deviation / MILLIMETRE, "mm"),
-                    "u_deviation": (surface.u_deviation / MILLIMETRE, "mm"),
-                }
-            )
+            of_prisms = ("point", "deviation_mm", "u_deviation_mm")
+            tables["surface"] = quantities(SURFACE.quantities(PrismRows(self.reduction, surface), of_prisms))
         return tables
 
     def figures(self) -> "dict[str, Figure]":

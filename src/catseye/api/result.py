@@ -57,6 +57,12 @@ class Result:
         """JSON object of the command, in Python's and numpy's own types."""
         raise NotImplementedError
 
+    def to_json(self) -> str:
+        """JSON object of the command, on one line."""
+        from catseye.gateways.writers.objects import json_line
+
+        return json_line(self.to_object())
+
     def tables(self) -> "dict[str, QTable]":
         """Tables of the answer by name, the main one first, with units."""
         raise NotImplementedError
@@ -127,7 +133,7 @@ class Result:
         files: dict[str, Callable[[], str]] = {}
         for name, made in (pages or {}).items():
             files[name] = partial(made, now)
-        files["result.json"] = lambda: json_page({"format": FORMAT, **self.to_object()})
+        files["result.json"] = lambda: json_page({"format": FORMAT, **_keyed(self.to_object())})
         for name, table in self.tables().items():
             files[f"{name}.csv"] = partial(_csv_of, table)
         for name, drawn in self.figures().items():
@@ -241,6 +247,11 @@ def quantities(columns: "Mapping[str, tuple[Any, str]]", **meta: Any) -> "QTable
 def digest_of(path: Path) -> str:
     """SHA-256 of a file, as provenance has it."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _keyed(answer: Any) -> dict[str, Any]:
+    """JSON object of an answer; a list of objects stands under "items"."""
+    return answer if isinstance(answer, dict) else {"items": answer}
 
 
 def _csv_of(table: "QTable") -> str:

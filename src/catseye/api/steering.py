@@ -1,30 +1,35 @@
-"""`point` and `track`: a mirror's encoder counts for points that stand still, and for points that move."""
+"""`point` and `track`: a mirror's encoder counts for points."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 
 from catseye.api.reading import place_of
 from catseye.api.result import Result, digest_of, quantities
 from catseye.api.units import In, with_units
-from catseye.errors import InputError
+from catseye.errors import ArgumentError, InputError, ValidityError
 
 if TYPE_CHECKING:
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.records.files.record import Record
     from catseye.records.site.keep_out import KeepOut
     from catseye.records.site.mirror import MirrorGeometry
     from catseye.records.site.monument import MonumentGeometry
+    from catseye.records.site.solids import Solids
     from catseye.reduction.site.stations import Pointings
+    from catseye.reduction.steering.aiming import AimedPoints
+    from catseye.reduction.steering.ground_track import GroundTrack
     from catseye.reduction.steering.sighting import Sighting
-    from catseye.reduction.steering.tracking import CountTrack
     from catseye.reduction.steering.visibility import Visibility
+
+R = TypeVar("R", bound="Record")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,9 +43,7 @@ class PointingResult(Result):
     prime          (n, 2) counts of the prime pointing
     autocollimation, back_retro   (n,) counts of elevation
     allowed, prime_allowed        (n,) bool: within the mirror's stops
-    pointings      everything else
-    sightings      Sun and keep-out boxes, one a point, where they were asked for
-    visibility     whether the mirror sees each point's reflector, where that was asked for
+    aimed          everything else
     names          monument, mirror, and the mirror that the monument's record names
     read           files that were read
     """
@@ -54,11 +57,24 @@ class PointingResult(Result):
     back_retro: np.ndarray
     allowed: np.ndarray
     prime_allowed: np.ndarray
-    pointings: "Pointings"
-    sightings: "list[Sighting]" = field(default_factory=list)
-    visibility: "Visibility | None" = None
+    aimed: "AimedPoints"
     names: dict[str, str | None] = field(default_factory=dict)
     read: tuple[Path, ...] = ()
+
+    @property
+    def pointings(self) -> "Pointings":
+        """Counts, stops and uncertainties, and the rays they follow from."""
+        return self.aimed.pointings
+
+    @property
+    def sightings(self) -> "list[Sighting]":
+        """Sun and keep-out boxes, one a point, where they were asked for."""
+        return self.aimed.sightings
+
+    @property
+    def visibility(self) -> "Visibility | None":
+        """Visibility of each point's reflector, where that was asked for."""
+        return self.aimed.visibility
 
     def passages(self) -> "Sequence[Passage]":
         """Number of points within reach, and remarks."""
@@ -67,14 +83,35 @@ class PointingResult(Result):
 
         reached = int(np.sum(self.allowed | self.prime_allowed))
         text = f"{self.names.get('mirror')} on {self.names.get('monument')} reaches {reached} of {len(self.to)} points."
-        remarks = pointing_remarks(self.pointings, self.sightings, self.visibility)
+        remarks = pointing_remarks(self.aimed)
+        recorded, used = self.names.get("mirror_of_monument"), self.names.get("mirror")
+        if recorded is not None and recorded != used:
+            of = self.names.get("monument")
+            remarks = [f"{used} is not the mirror that the record of {of} names, {recorded}", *remarks]
         return [Passage("Counts", text), *(Passage("Note", remark) for remark in remarks)]
 
     def to_object(self) -> Any:
         """JSON object of `catseye point --json`: a list, one object a point."""
         from catseye.gateways.steering.pointing_objects import pointing_objects
 
-        return [{**item, **self.names} for item in pointing_objects(self.pointings, self.sightings, self.visibility)]
+        return [{**item, **self.names} for item in pointing_objects(self.aimed)]
+
+    def lines(self) -> list[str]:
+        """Lines of the table of counts that the command prints."""
+        from catseye.gateways.steering.pointing_objects import pointing_table
+
+        return pointing_table(self.pointings).splitlines()
+
+    def save_counts(self, path: "str | os.PathLike[str]") -> None:
+        """Write CAL.EQ's output.dat.
+
+        path   new, or an earlier file of catseye
+
+        Raises InputError for another's file, and where nothing can be written.
+        """
+        from catseye.gateways.steering.pointing_objects import write_output_dat
+
+        write_output_dat(self.pointings, f"{self.names['mirror']} on {self.names['monument']}", Path(path))
 
     def tables(self) -> "dict[str, QTable]":
         """`counts`: a row a point."""
@@ -107,107 +144,172 @@ def point(
     mirror: "str | os.PathLike[str] | MirrorGeometry",
     to: Annotated[Any, In("m", text=True)],
     *,
-    at_mjd: Annotated[Any, In("mjd", one=True)] = None,
+    at_mjd: Annotated[Any, In("mjd", one=True, text=True)] = None,
     latitude_deg: Annotated[Any, In("deg", one=True)] = None,
     longitude_deg: Annotated[Any, In("deg", one=True)] = None,
-    keep_out: "KeepOut | None" = None,
+    sun_cone_deg: Annotated[Any, In("deg", one=True)] = None,
+    keep_out: "str | os.PathLike[str] | KeepOut | None" = None,
     reflector: str | None = None,
     facing: Annotated[Any, In("", many=True)] = None,
-    solids: "str | os.PathLike[str] | None" = None,
+    solids: "str | os.PathLike[str] | Solids | None" = None,
     posture_deg: Annotated[Any, In("deg", many=True)] = None,
 ) -> PointingResult:
-    """Encoder counts of a mirror for points, both pointings, with stops, Sun, keep-out boxes and visibility.
+    """Encoder counts of a mirror for points: CAL.EQ.
+
+    Both pointings, with stops, Sun, keep-out boxes and visibility.
 
     monument, mirror   records, or their files
     to                 (n, 3) or (3,) m, ground; or a coord.dat of lines x y z in mm
-    at_mjd             UTC: is the Sun in the way?
-    latitude_deg, longitude_deg   of the site, east positive; the monument's record without
-    keep_out           boxes that no beam may enter, and the cone kept from the Sun; what `load` gives of such a file
-    reflector, facing  what stands at the points, and its outward axis in ground axes: is it visible?
-    solids             what may stand in the way, with the telescope at posture_deg, azimuth and elevation
+    at_mjd             UTC, MJD or a text such as 2003-09-07T15:12:09Z: is the Sun in the way?
+    latitude_deg, longitude_deg   of the site, east positive; the monument's record without; with at_mjd
+    sun_cone_deg       half angle kept from the Sun, 0.5 to 60; of keep_out, or 5, without; with at_mjd
+    keep_out           boxes that no beam may enter, or their file
+    reflector          "prism", "hollow" or "ball" at the points: is it visible?
+    facing             (3,) outward axis of the reflectors, ground axes
+    solids             obstacles, or their file
+    posture_deg        azimuth and elevation of the telescope, for solids that it carries; with solids
 
-    Raises InputError for records that cannot be used. Source: [PARKER04] section 2.
+    Raises ArgumentError for arguments that do not fit together, InputError for records that cannot be used.
+    Source: [PARKER04] section 2.
 
     >>> counts = point("night-01/monuments/ZY103.toml", "night-01/mirrors/ZP103.toml", [0.0, 0.0, 50.0]).counts
     >>> counts.shape
     (1, 2)
     """
-    from catseye.gateways.steering.pointing_objects import pointing_verdict
-    from catseye.records.files.reading import read_record
-    from catseye.records.laboratory.coordinate_list import read_coordinates
     from catseye.records.site.keep_out import KeepOut
     from catseye.records.site.mirror import MirrorGeometry
     from catseye.records.site.monument import MonumentGeometry
     from catseye.records.site.solids import Solids
-    from catseye.reduction.site.stations import point as pointed
-    from catseye.reduction.site.stations import station_of
-    from catseye.reduction.steering.sighting import place_of_monument, seen_from, sightings
+    from catseye.reduction.steering.aiming import BeamSurroundings, aim_mirror
 
-    read: list[Path] = []
-
-    def record(given: Any, kind: type) -> Any:
-        if isinstance(given, kind):
-            return given
-        read.append(place_of(given))
-        return read_record(read[-1], kind)
-
-    stands, mirrors = record(monument, MonumentGeometry), record(mirror, MirrorGeometry)
-    if isinstance(to, str | os.PathLike):
-        read.append(place_of(to))
-        where = read_coordinates(read[-1])
-    else:
-        where = np.atleast_2d(np.asarray(to, dtype=float))
-    if where.ndim != 2 or where.shape[1] != 3 or not np.isfinite(where).all():
-        raise InputError(f"points of shape {where.shape} (expected (n, 3) or (3,), finite, m)")
-    pointings, station = pointed(stands, mirrors, where), station_of(stands, mirrors)
-    zones = keep_out or KeepOut()
-    sights: list[Sighting] = []
-    if at_mjd is not None or zones.box:
-        place = None if at_mjd is None else place_of_monument(stands, longitude_deg, latitude_deg)
-        sights = sightings(
-            station, mirrors, pointings.counts, name=stands.monument, mjd=at_mjd, place=place, keep_out=zones
-        )
-    seen = None
-    if reflector or facing is not None or solids is not None:
-        seen = seen_from(
-            station,
-            stands.monument,
-            where,
-            kind=reflector or "prism",
-            facing=None if facing is None else np.asarray(facing, dtype=float),
-            solids=Solids() if solids is None else record(solids, Solids),
-            posture=None if posture_deg is None else (np.radians(posture_deg[0]), np.radians(posture_deg[1])),
-            reachable=pointings.allowed | pointings.prime_allowed,
-        )
-    return PointingResult(
-        pointing_verdict(pointings, sights, seen),
-        pointings.to,
-        pointings.aim.range,
-        pointings.counts,
-        pointings.u,
-        pointings.prime,
-        pointings.autocollimation,
-        pointings.back_retro,
-        pointings.allowed,
-        pointings.prime_allowed,
-        pointings,
-        sights,
-        seen,
-        {"monument": stands.monument, "mirror": mirrors.zp, "mirror_of_monument": stands.zp},
-        tuple(read),
+    mjd, cone, posture = _mjd(at_mjd), _sun_cone(sun_cone_deg), _posture(posture_deg)
+    axis = _facing(facing)
+    by_sun = {"sun_cone_deg": sun_cone_deg, "latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
+    _refuse_alone(by_sun, "at_mjd", at_mjd)
+    _refuse_alone({"posture_deg": posture_deg}, "solids", solids)
+    records = _Records()
+    stands, mirrors = records.read(monument, MonumentGeometry), records.read(mirror, MirrorGeometry)
+    where = records.points(to)
+    zones = KeepOut() if keep_out is None else records.read(keep_out, KeepOut)
+    if cone is not None:
+        zones = zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": cone})})
+    surroundings = BeamSurroundings(
+        mjd=mjd,
+        longitude_deg=longitude_deg,
+        latitude_deg=latitude_deg,
+        keep_out=zones,
+        kind=reflector,
+        facing=axis,
+        solids=None if solids is None else records.read(solids, Solids),
+        posture=posture,
     )
+    aimed = aim_mirror(stands, mirrors, where, surroundings)
+    pointings = aimed.pointings
+    return PointingResult(
+        verdict=aimed.verdict,
+        to=pointings.to,
+        range_=pointings.aim.range,
+        counts=pointings.counts,
+        u=pointings.u,
+        prime=pointings.prime,
+        autocollimation=pointings.autocollimation,
+        back_retro=pointings.back_retro,
+        allowed=pointings.allowed,
+        prime_allowed=pointings.prime_allowed,
+        aimed=aimed,
+        names={"monument": stands.monument, "mirror": mirrors.zp, "mirror_of_monument": stands.zp},
+        read=tuple(records.paths),
+    )
+
+
+@dataclass
+class _Records:
+    """Records read from files; `paths` collects these."""
+
+    paths: list[Path] = field(default_factory=list)
+
+    def read(self, source: Any, kind: type[R]) -> R:
+        """Record of a kind, or the one in a file."""
+        from catseye.records.files.reading import read_record
+
+        if isinstance(source, kind):
+            return source
+        self.paths.append(place_of(source))
+        return read_record(self.paths[-1], kind)
+
+    def points(self, to: Any) -> np.ndarray:
+        """Points (n, 3) m, of numbers or of a coord.dat."""
+        if isinstance(to, str | os.PathLike):
+            from catseye.records.laboratory.coordinate_list import read_coordinates
+
+            self.paths.append(place_of(to))
+            return read_coordinates(self.paths[-1])
+        where = np.atleast_2d(np.asarray(to, dtype=float))
+        if where.ndim != 2 or where.shape[1] != 3 or not np.isfinite(where).all():
+            raise InputError(f"points of shape {where.shape} (expected (n, 3) or (3,), finite, m)")
+        return where
+
+
+def _refuse_alone(values: Mapping[str, Any], needed: str, value: Any) -> None:
+    """Raises ArgumentError for what says nothing without another argument."""
+    for name, each in values.items():
+        if each is not None and value is None:
+            raise ArgumentError(f"{name} says nothing without {needed}", name, needed)
+
+
+def _mjd(at_mjd: Any) -> float | None:
+    """MJD of a number or a text. Raises ArgumentError for another text."""
+    from catseye.geometry.sky.time_tag import mjd_of
+
+    if not isinstance(at_mjd, str):
+        return None if at_mjd is None else float(at_mjd)
+    try:
+        return mjd_of(at_mjd)
+    except ValidityError as problem:
+        raise ArgumentError(f"at_mjd = {problem}", "at_mjd") from problem
+
+
+def _sun_cone(sun_cone_deg: float | None) -> float | None:
+    """Half angle of the Sun's cone, deg. Raises ArgumentError outside 0.5 to 60."""
+    if sun_cone_deg is not None and not 0.5 <= sun_cone_deg <= 60.0:
+        raise ArgumentError(f"sun_cone_deg = {sun_cone_deg:g} is not 0.5 to 60 degrees", "sun_cone_deg")
+    return sun_cone_deg
+
+
+def _facing(facing: Sequence[float] | None) -> np.ndarray | None:
+    """Outward axis (3,). Raises ArgumentError for a zero vector."""
+    axis = None if facing is None else np.asarray(facing, dtype=float)
+    if axis is not None and (axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any()):
+        raise ArgumentError(f"facing = {axis.tolist()} points nowhere (expected three numbers, not all zero)", "facing")
+    return axis
+
+
+def _posture(posture_deg: Sequence[float] | None) -> tuple[float, float] | None:
+    """Posture (2,), rad. Raises ArgumentError beyond the telescope's."""
+    if posture_deg is None:
+        return None
+    if len(posture_deg) != 2 or not _within(*posture_deg):
+        said = ", ".join(f"{v:g}" for v in posture_deg)
+        raise ArgumentError(f"posture_deg = {said} (expected azimuth -540 to 540, elevation -5 to 95)", "posture_deg")
+    return float(np.radians(posture_deg[0])), float(np.radians(posture_deg[1]))
+
+
+def _within(azimuth_deg: float, elevation_deg: float) -> bool:
+    return abs(azimuth_deg) <= 540.0 and -5.0 <= elevation_deg <= 95.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrackResult(Result):
-    """Counts along which one mirror follows n points that move, over intervals between k + 1 times.
+    """Counts of one mirror that follows n points.
+
+    Over intervals between k + 1 times.
 
     seconds    (k + 1,) s, ends of the intervals
     counts     (k + 1, n, 2) azimuth and elevation at each, on one turn and in one pointing
     misses     (s, k, n) m, how far the beam passes its target at s instants of each interval
     worst      (n,) m, the largest of each
-    status     (n,) text: "followed", or why not
-    followed   everything else
+    status     (n,) text: "followed", or the reason against it
+    track      everything else
     """
 
     seconds: np.ndarray
@@ -215,7 +317,7 @@ class TrackResult(Result):
     misses: np.ndarray
     worst: np.ndarray
     status: tuple[str, ...]
-    followed: "CountTrack"
+    track: "GroundTrack"
 
     def passages(self) -> "Sequence[Passage]":
         """Number of points followed, and the beams' largest distances from them."""
@@ -248,7 +350,7 @@ class TrackResult(Result):
         from catseye.gateways.steering.tracking_figures import miss_figure
         from catseye.reduction.steering.tracking import SHARES
 
-        return {"misses": miss_figure(self.followed, self.misses[:, :, None, :], SHARES)}
+        return {"misses": miss_figure(self.track.track, self.misses[:, :, None, :], SHARES)}
 
 
 @with_units
@@ -265,7 +367,9 @@ def track(
     azimuth_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
     elevation_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
 ) -> TrackResult:
-    """Counts at t0 and t1 of each interval for points that move with the telescope as it slews or tracks.
+    """Mirror counts for points that move with the telescope.
+
+    At t0 and t1 of each interval, as it slews or tracks.
 
     monument, mirror    records, or their files; of a ranger on the ground
     points              (n, 3) or (3,) m, fixed in the frame
@@ -275,7 +379,7 @@ def track(
     interval_s          length of an interval: a buffer's
     azimuth_rate_deg_per_s, elevation_rate_deg_per_s   of the drives; the Green Bank Telescope's fastest without
 
-    A point that the mirror cannot follow has a status that says why, and no counts that mean anything.
+    A point that the mirror cannot follow has a status that names the reason, and no counts that mean anything.
     Raises InputError for records and postures that cannot be used. Source: [PARKER04] section 2.6.
 
     >>> went = track("night-01/monuments/ZY103.toml", "night-01/mirrors/ZP103.toml", [0.0, 54.0, 12.0],
@@ -284,54 +388,39 @@ def track(
     (('followed',), True)
     """
     from catseye.constants import DEGREE
-    from catseye.gateways.writers.verdict import Verdict
     from catseye.geometry.sky.time_tag import TimeTag
-    from catseye.records.files.reading import read_record
     from catseye.records.site.mirror import MirrorGeometry
     from catseye.records.site.monument import MonumentGeometry
-    from catseye.reduction.site.stations import station_of
-    from catseye.reduction.steering.tracking import (
-        AZIMUTH_SLEW,
-        ELEVATION_SLEW,
-        AntennaPath,
-        Drive,
-        fixed,
-        follow,
-        misses,
-        mounted,
-    )
+    from catseye.reduction.steering.ground_track import follow_points
+    from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, AntennaPath, Drive
 
-    stands = monument if isinstance(monument, MonumentGeometry) else read_record(place_of(monument), MonumentGeometry)
-    mirrors = mirror if isinstance(mirror, MirrorGeometry) else read_record(place_of(mirror), MirrorGeometry)
+    records = _Records()
+    stands, mirrors = records.read(monument, MonumentGeometry), records.read(mirror, MirrorGeometry)
     where = np.atleast_2d(np.asarray(points, dtype=float))
     if where.ndim != 2 or where.shape[1] != 3 or not np.isfinite(where).all():
         raise InputError(f"points of shape {where.shape} (expected (n, 3) or (3,), finite, m)")
     for az, el in (start_deg, end_deg):
-        if not (abs(az) <= 540.0 and -5.0 <= el <= 95.0):
+        if not _within(az, el):
             raise InputError(f"posture {az:g}, {el:g} deg (expected azimuth -540 to 540, elevation -5 to 95)")
-    given = (azimuth_rate_deg_per_s, elevation_rate_deg_per_s)
-    fastest = (AZIMUTH_SLEW, ELEVATION_SLEW)
-    rates = [most if rate is None else rate * DEGREE for rate, most in zip(given, fastest, strict=True)]
+    fastest = ((azimuth_rate_deg_per_s, AZIMUTH_SLEW), (elevation_rate_deg_per_s, ELEVATION_SLEW))
+    rates = [most if rate is None else rate * DEGREE for rate, most in fastest]
     ends = zip(start_deg, end_deg, rates, strict=True)
     azimuth, elevation = (Drive(a * DEGREE, b * DEGREE, rate=rate) for a, b, rate in ends)
-    path = AntennaPath(azimuth, elevation)
-    intervals = max(1, int(np.ceil(max(path.azimuth.duration, path.elevation.duration) / interval_s)))
-    limits = (mirrors.az_low_limit, mirrors.az_high_limit)
-    stations, targets = mounted(station_of(stands, mirrors)[None]), fixed(where, frame, path)
-    followed = follow(
-        stations, targets, TimeTag.from_mjd(start_mjd), intervals=intervals, interval=interval_s, limits=limits
+    followed = follow_points(
+        stands,
+        mirrors,
+        where,
+        frame=frame,
+        path=AntennaPath(azimuth, elevation),
+        start=TimeTag.from_mjd(start_mjd),
+        interval=interval_s,
     )
-    off = misses(followed, stations, targets)[:, :, 0]
-    good = followed.status[0] == 0
-    status = tuple(followed.reason(0, k) for k in range(len(where)))
-    nodes = np.concatenate([followed.lines.start, followed.lines.end[-1:]])[:, 0]
-    lost = np.flatnonzero(~good)
-    if not good.any():
-        verdict = Verdict("failed", f"the mirror follows no point; point 0 {status[0]}")
-    elif len(lost):
-        text = f"{len(lost)} of {len(where)} points are not followed; point {lost[0]} {status[lost[0]]}"
-        verdict = Verdict("doubtful", text)
-    else:
-        verdict = Verdict("good", "every point is followed on one turn and in one pointing")
-    worst = np.where(good, off.max(axis=(0, 1)), np.nan)
-    return TrackResult(verdict, followed.since, nodes, off, worst, status, followed)
+    return TrackResult(
+        verdict=followed.verdict,
+        seconds=followed.track.since,
+        counts=followed.counts,
+        misses=followed.misses,
+        worst=followed.worst,
+        status=followed.status,
+        track=followed,
+    )

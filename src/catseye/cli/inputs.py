@@ -8,6 +8,10 @@ from pathlib import Path
 from typing import Any, get_args
 
 import typer
+from typer.models import ArgumentInfo, OptionInfo
+
+from catseye.cli.terminal import by_options, for_programs
+from catseye.errors import ArgumentError
 
 WRITTEN = frozenset(  # options and arguments whose path is made, not read
     {"actuators", "blank", "certificate", "copy", "directory", "out", "page", "template", "write", "write_stars"}
@@ -45,19 +49,37 @@ def _with_examples(callback: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(callback)
     def run(**given: Any) -> Any:
         if read:
-            from catseye.gateways.examples import located
+            from catseye.api.reading import place_of
 
             for name in read:
                 value = given.get(name)
                 if isinstance(value, Path):
-                    given[name] = located(value, output=name in OUTPUTS)
+                    given[name] = place_of(value, output=name in OUTPUTS)
                 elif isinstance(value, list):
-                    given[name] = [located(each, output=name in OUTPUTS) for each in value]
-        return callback(**given)
+                    given[name] = [place_of(each, output=name in OUTPUTS) for each in value]
+        try:
+            with for_programs(bool(given.get("json"))):
+                return callback(**given)
+        except ArgumentError as problem:  # here the command is known, and how it spells its options
+            raise ArgumentError(by_options(str(problem), problem.names, spelled(callback))) from problem
 
     run.__signature__ = inspect.signature(callback)  # type: ignore[attr-defined]
     run.__prepared__ = True  # type: ignore[attr-defined]
     return run
+
+
+def spelled(callback: Callable[..., Any]) -> dict[str, str]:
+    """Options of a command by their parameters' names, an argument by its name in `--help`."""
+    names = {}
+    for name, parameter in inspect.signature(callback).parameters.items():
+        for info in get_args(parameter.annotation)[1:]:
+            if isinstance(info, ArgumentInfo):
+                names[name] = info.metavar or name.upper()
+            elif isinstance(info, OptionInfo):  # in `Annotated`, the first spelling stands where a default would
+                spellings = [each for each in (info.default, *(info.param_decls or ())) if isinstance(each, str)]
+                options = [each.split("/")[0] for each in spellings if each.startswith("--")]
+                names |= {name: options[0]} if options else {}
+    return names
 
 
 def _complete(parameter: inspect.Parameter) -> None:

@@ -13,7 +13,7 @@ def run() -> None:
     """`catseye`: exits with 0 done, 1 could not, 2 wrong usage, 130 on Ctrl-C, 143 when terminated."""
     for number in WORDS:  # nothing to undo yet; what knows how to is imported next
         signal.signal(number, stopped)
-    from catseye.gateways.writers.interruption import exit_on_signals, ignore_signals
+    from catseye.interruption import exit_on_signals, ignore_signals
 
     if sys.argv[1:2] and sys.argv[1] not in LIVING and not sys.argv[1].startswith("-") and hasattr(os, "fork"):
         from catseye.cli.supervisor import work_in_child

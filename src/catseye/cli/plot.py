@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from catseye.cli.commands import Json, Quiet, app, uncertainty
-from catseye.cli.point import time_text
 from catseye.cli.terminal import say, wrapped
 from catseye.cli.vocabularies import AIR_MODELS, one_of
 from catseye.constants import DEGREE
-from catseye.errors import InputError
+from catseye.errors import InputError, ValidityError
 
 if TYPE_CHECKING:
     from catseye.gateways.writers.drawing import Svg
@@ -32,6 +31,17 @@ Out = Annotated[
     Path, typer.Option("--out", metavar="FIGURE", help="Figure to write, .svg, .pdf or .png: new, or an earlier one.")
 ]
 U = {"callback": uncertainty}
+
+
+def time_text(text: str) -> str:
+    """Validate a time; returns it unchanged."""
+    from catseye.geometry.sky.time_tag import mjd_of
+
+    try:
+        mjd_of(text)
+    except ValidityError as problem:
+        raise typer.BadParameter(f"{problem}.") from problem
+    return text
 
 
 def _pair(text: str | None) -> str | None:

@@ -9,7 +9,7 @@ from catseye.cli.terminal import complain, say, wrapped
 
 if TYPE_CHECKING:
     from catseye.api.result import Result
-    from catseye.gateways.writers.verdict import Verdict
+    from catseye.verdict import Verdict
 
 Strict = Annotated[bool, typer.Option("--strict", help="Exit with 1, after writing, where the verdict is not good.")]
 
@@ -33,9 +33,7 @@ def tell(
     written   title and what was written under it; None: nothing was
     """
     if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(result.to_object()))
+        say(result.to_json())
     elif not quiet:
         say(wrapped("Verdict", result.verdict.text))
         for passage in result.passages() if sentences else ():

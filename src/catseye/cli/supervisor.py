@@ -15,7 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import NoReturn
 
-from catseye.gateways.writers.interruption import (
+from catseye.interruption import (
     LONGEST_DEFERRAL,
     UnfinishedWork,
     exit_on_signals,

@@ -7,9 +7,10 @@ import textwrap
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable
-from contextlib import suppress
-from types import TracebackType
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from types import MappingProxyType, TracebackType
 
 from catseye.errors import ArgumentError, CatseyeError
 
@@ -17,7 +18,9 @@ WIDTH = 100  # columns; longer lines are hard to read
 INTERVAL = 0.1  # s between two refreshes of the progress line
 FIRST_LINE, BETWEEN_LINES = 10.0, 10.0  # s until progress is told where stderr is no terminal, and between its lines
 BEAT = 1.0  # s between two looks at a step that is silent
-SURE = 2.0  # s of a step before an end is foretold
+SURE = 2.0  # s of a step before its end is predicted
+
+_for_programs: ContextVar[bool] = ContextVar("for_programs", default=False)  # the running command has `--json`
 
 
 def finish(command: Callable[[], None]) -> int:
@@ -56,15 +59,22 @@ def attempt(command: Callable[[], None]) -> int:
     return 0
 
 
-def by_options(text: str, names: Iterable[str]) -> str:
+def by_options(text: str, names: Iterable[str], options: Mapping[str, str] = MappingProxyType({})) -> str:
     """A text with the options of a command in place of the arguments of its call.
+
+    names     arguments that the text names
+    options   their spellings, where an option is not spelled as its argument
 
     >>> by_options("give pressure_hpa or barometer_mmhg", ["pressure_hpa", "barometer_mmhg"])
     'give --pressure-hpa or --barometer-mmhg'
+    >>> by_options("since 3 is not before until 2", ["since", "until"], {"since": "--from"})
+    '--from 3 is not before --until 2'
     """
-    for name in names:
-        text = re.sub(rf"\b{name}\b", f"--{name.replace('_', '-')}", text)
-    return text
+    if not (pattern := "|".join(re.escape(name) for name in names)):
+        return text
+    return re.sub(
+        rf"(?<!-)\b({pattern})\b", lambda found: options.get(found[0], f"--{found[0].replace('_', '-')}"), text
+    )
 
 
 def say(text: str) -> None:
@@ -97,6 +107,16 @@ def wrapped(title: str, text: str) -> str:
     return textwrap.fill(text, max(width, 40), initial_indent=f"{title:<13} ", subsequent_indent=" " * 14)
 
 
+@contextmanager
+def for_programs(json: bool) -> Iterator[None]:
+    """Run a command that answers programs, or people: what `ProgressLine` goes by."""
+    before = _for_programs.set(json)
+    try:
+        yield
+    finally:
+        _for_programs.reset(before)
+
+
 class ProgressLine:
     """Progress on stderr, with an estimate of the remaining time.
 
@@ -105,10 +125,12 @@ class ProgressLine:
     page of a report, is named again with how long it has taken.
     """
 
-    def __init__(self, quiet: bool) -> None:
+    def __init__(self, quiet: bool, json: bool | None = None) -> None:
+        """quiet: nothing at all; json: no plain lines; None: as the running command says."""
         here = sys.stderr is not None
+        silent = _for_programs.get() if json is None else json
         self._shown = not quiet and here and sys.stderr.isatty()
-        self._plain = not quiet and here and not self._shown and not _asks_for_json()
+        self._plain = not quiet and here and not self._shown and not silent
         self._last = ""
         self._start = self._next = time.monotonic()
         self._next_line = self._start + FIRST_LINE
@@ -183,10 +205,6 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
-
-
-def _asks_for_json() -> bool:
-    return "--json" in sys.argv
 
 
 def _silence_stdout() -> None:

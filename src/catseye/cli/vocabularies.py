@@ -1,21 +1,23 @@
 """The words that options take and `--help` prints, each list once for all commands.
 
-They are decided elsewhere, in modules whose import `--help` spares itself; `tests/cli/test_vocabularies.py` holds each
-list equal to its source.
+They are decided elsewhere, in modules whose import `--help` spares itself, or in `catseye.names`, which imports
+nothing; `tests/cli/test_vocabularies.py` holds each list equal to its source.
 """
 
 from collections.abc import Callable
 
 import typer
 
+from catseye import names
+
 # atmosphere
-AIR_MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
+AIR_MODELS = "|".join(names.AIR_MODELS)
 SOUND_MODELS = "parker2004|cramer1993|real_gas"
 THERMOMETRY_MODELS = "real_gas|cramer1993|parker2004"  # the one of choice first
 
 # optics and mirrors
 EDITIONS = "iec2014|ansi2014"
-REFLECTORS = "prism|hollow|ball"
+REFLECTORS = "|".join(names.RETROREFLECTORS)
 
 # calibrations and their reports
 CALIBRATION_KINDS = (

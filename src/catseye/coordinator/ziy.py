@@ -160,7 +160,7 @@ class Coordinator:
     ) -> dict[str, RangerLink]:
         """Links to the rangers; dish prisms are sent on demand."""
         commands_of = commands or (lambda ranger: commands_of_ranger(self.site, ranger))
-        later = [t.name for t in self.site.targets.values() if t.type == "prism" and t.frame == "reflector"]
+        later = [t.name for t in self.site.targets.values() if t.shapes_dish]
         return {
             name: RangerLink(
                 name,

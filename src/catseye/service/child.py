@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import undo_on_interruption
+from catseye.interruption import undo_on_interruption
 
 PROGRAM = (sys.executable, "-P", "-m", "catseye")
 LONGEST_START = 120.0  # s until the child's first line: its kernels are compiled the first time

@@ -22,7 +22,7 @@ from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
 from catseye.gateways.journal.chain import export_verdict
 from catseye.gateways.journal.export import export_tables
-from catseye.gateways.writers.interruption import Unfinished, undo_on_interruption
+from catseye.interruption import Unfinished, undo_on_interruption
 from catseye.verdict import Verdict
 
 STEP = 500  # SQLite VM steps between checks for signals and progress: some ms, 2 MB of buffers

@@ -29,7 +29,7 @@ class LiveRun(Generic[T]):
     work           makes the coroutine; a signal cancels it, once
     loop_factory   of the loop; asyncio's own if None
 
-    The first signal cancels; a second one, or 4 s, exit at once as `gateways.writers.interruption` does.
+    The first signal cancels; a second one, or 4 s, exit at once as `interruption` does.
     """
 
     def __init__(

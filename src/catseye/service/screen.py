@@ -17,7 +17,7 @@ from catseye.constants import DEGREE
 from catseye.coordinator.condition import SIGNS, WRONG, SiteCondition
 from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.parts import ticks_now
-from catseye.gateways.writers.interruption import undo_on_interruption
+from catseye.interruption import undo_on_interruption
 from catseye.records.night.live import Happening
 from catseye.service.book import GOOD, RunSummary
 from catseye.service.logs import one_line, time_text

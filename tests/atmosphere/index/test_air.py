@@ -16,6 +16,7 @@ from catseye.atmosphere.index.air import (
 )
 from catseye.atmosphere.weather import humidity
 from catseye.errors import ValidityError
+from catseye.names import AIR_MODELS
 
 GOOD = {"temperature_c": 20.0, "pressure_hpa": 933.0, "humidity_percent": 50.0}
 REFUSED = [
@@ -64,7 +65,7 @@ REFUSED = [
     ),
     (
         {"model": "edlen"},
-        "air model 'edlen' is unknown; choose one of ciddor_hill1999, rueger1990, iag1999_closed, barrell_sears1963",
+        f"air model 'edlen' is unknown; choose one of {', '.join(AIR_MODELS)}",
     ),
 ]
 

@@ -1,5 +1,6 @@
 """The compiled forms of two air models against their plain forms, which are tested against printed tables."""
 
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,11 @@ from catseye.atmosphere.index.air import MODELS
 from catseye.atmosphere.weather import humidity
 from catseye.errors import ValidityError
 
-KERNELS = {"rueger1990": rueger1990_kernel.refractivity, "ciddor_hill1999": ciddor_hill1999_kernel.refractivity}
+KERNELS = {
+    name: import_module(f"catseye.atmosphere.index.{name}_kernel").refractivity
+    for name, model in MODELS.items()
+    if model.is_compiled
+}
 SAME = 1e-15  # in the index: a ten-millionth of a micrometre in a kilometre
 QUANTITIES = ("temperature_c", "pressure_hpa", "humidity_percent")
 

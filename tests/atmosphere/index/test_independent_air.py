@@ -19,6 +19,7 @@ import pytest
 
 from catseye.atmosphere.index import air, ciddor_hill1999
 from catseye.atmosphere.weather import humidity
+from catseye.names import AIR_MODEL
 from repository import ROOT, TESTS
 
 TABLE = TESTS / "vectors" / "independent_air.npz"
@@ -190,9 +191,11 @@ def test_dry_air_departs_by_the_square_of_its_density(study):
 
 def test_the_page_states_the_differences_that_the_study_finds(study):
     page = (STUDY.parents[1] / "docs" / "studies" / "lorentz-lorenz.md").read_text(encoding="utf-8")
-    for name, found in study.models_apart().items():
-        row = next(line for line in page.splitlines() if line.startswith(f"| `{name}`"))
-        stated = [float(cell.replace("−", "-")) for cell in row.split("|")[2:-1]]
+    rows = {line.split("`")[1]: line for line in page.splitlines() if line.startswith("| `")}
+    apart = study.models_apart()
+    assert set(apart) == set(rows) == set(air.MODELS) - {AIR_MODEL}
+    for name, found in apart.items():
+        stated = [float(cell.replace("−", "-")) for cell in rows[name].split("|")[2:-1]]
         assert stated == pytest.approx(list(found.values()), abs=6e-4)
     for kind, (value, _) in study.largest().items():
         assert value == pytest.approx({"phase": 3.7e-9, "group": 3.8e-9}[kind], abs=0.06e-9)

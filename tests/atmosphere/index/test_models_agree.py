@@ -1,13 +1,27 @@
 """How far the notes' model lies from today's: the numbers that the documentation states."""
 
+import re
+
 import numpy as np
 import pytest
 
 from catseye.atmosphere.index.air import MODELS, air, group_refractivity, phase_refractivity
+from catseye.names import AIR_MODEL
+from repository import ROOT
 
 # largest |difference| from Ciddor and Hill, ppm, over -20 to 45 °C, 600 to 1100 hPa, 0 to 100 %, 0.633 to 1.55 um
 STATED = {"rueger1990": 0.52, "iag1999_closed": 0.31, "barrell_sears1963": 0.32}
 LASERS = (0.633, 0.780, 0.850, 1.55)
+
+
+def test_every_model_states_its_difference_here_and_in_the_conventions():
+    assert set(STATED) == set(MODELS) - {AIR_MODEL}
+    air_of_conventions = (
+        (ROOT / "docs" / "conventions.md").read_text("utf-8").partition("## Air")[2].partition("\n## ")[0]
+    )
+    said = re.findall(r"`(\w+)` (0\.\d+)", air_of_conventions)
+    assert {name: float(ppm) for name, ppm in said if name in MODELS} == STATED
+    assert f"`{AIR_MODEL}`" in air_of_conventions
 
 
 def departure(*weather, model="rueger1990", **light):

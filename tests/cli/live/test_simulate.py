@@ -121,7 +121,9 @@ def test_another_seed_is_another_site():
     assert [e["rms_mm"] for e in one["epochs"]] != [e["rms_mm"] for e in two["epochs"]]
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "status"), [pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow), (signal.SIGTERM, 143)]
+)
 def test_a_run_in_real_time_ends_clean_while_it_measures(tmp_path, number, status):
     """Status in time, no child, no temporary file, and a journal without a lock that says what was acknowledged."""
     journal = tmp_path / "out" / "night.db"

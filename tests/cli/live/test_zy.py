@@ -80,7 +80,9 @@ def test_a_port_that_is_taken_is_named(catseye):
     assert f"ZY101: 127.0.0.1 port {port} is not available" in err
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(
+    ("number", "status"), [pytest.param(signal.SIGTERM, 0, marks=pytest.mark.slow), (signal.SIGINT, 130)]
+)
 def test_it_serves_people_and_ends_clean(tmp_path, number, status):
     """A person's dialogue: a shot on the cube inside, by night."""
     words = ["zy", small_site(), "ZY102", "--twin", "--start", "60635.125", "--port-base", "0", "--json"]

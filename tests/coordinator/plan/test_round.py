@@ -9,6 +9,7 @@ from catseye.coordinator.visibility.surroundings import KeepClear
 from catseye.coordinator.visibility.vantage import nominal_posture
 from catseye.errors import InputError
 from catseye.geometry.mirror.slew import trapezoid
+from catseye.optics.retroreflector.kinds.registry import BALL
 from catseye.records.files.reading import read_record
 from catseye.records.night.live import TICK_SECONDS, LivePosture
 from catseye.records.site.solids import Solids
@@ -87,7 +88,7 @@ def test_targets_seen_by_three_rangers_get_three_well_spread_ones(first):
     found = shooters(first)
     place = placed(posture(NIGHT))
     for name, retro in targets().items():
-        if not (retro.kind == "ball" or retro.part == "structure"):
+        if not (retro.kind is BALL or retro.part == "structure"):
             continue
         could = [r for r in gbt().monuments if r not in {ranger for ranger, _ in seen.get(name, ())}]
         got = found.get(name, set())
@@ -104,8 +105,8 @@ def test_targets_seen_by_three_rangers_get_three_well_spread_ones(first):
 
 
 def test_uncertain_points_come_before_well_determined_ones(first):
-    known = {n: (5e-6) ** 2 * np.eye(3) for n, r in targets().items() if r.kind == "ball" and n != "TR05-B"}
-    planner = RoundPlanner(few_prisms(), targets=[n for n, r in targets().items() if r.kind == "ball"])
+    known = {n: (5e-6) ** 2 * np.eye(3) for n, r in targets().items() if r.kind is BALL and n != "TR05-B"}
+    planner = RoundPlanner(few_prisms(), targets=[n for n, r in targets().items() if r.kind is BALL])
     counts = {n: [s.target for s in shots[1:]] for n, shots in planner.round(state(NIGHT, u=known)).shots.items()}
     firsts = [names[0] for n, names in counts.items() if n in gbt().monuments and "TR05-B" in names]
     assert len(firsts) >= 3
@@ -129,7 +130,7 @@ def test_ranger_with_an_uncertain_position_has_less_value():
 def test_value_of_a_range_includes_noise_and_ranger_position():
     """Of a point known to p in each direction, along any line: p - p^2 / 3 (p + sigma^2 + u^2) is left of its mean."""
     u = 0.5e-3
-    known = {n: (0.3e-3) ** 2 * np.eye(3) for n, r in targets().items() if r.kind == "ball"}
+    known = {n: (0.3e-3) ** 2 * np.eye(3) for n, r in targets().items() if r.kind is BALL}
     planner = RoundPlanner(few_prisms(), targets=list(known))
     told = state(NIGHT, ready=("ZY105",), u=known | {"ZY105": u**2 * np.eye(3)})
     reasons = [shot.reason for shot in planner.round(told).shots["ZY105"] if shot.reason.startswith("u of TR")]

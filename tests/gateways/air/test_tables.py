@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.gateways.air.acoustic_objects import path_temperatures_csv, shots_csv
-from catseye.gateways.air.refractometer_report import series_csv
+from catseye.gateways.air.tables import path_temperatures_csv, series_csv, shots_csv
 from catseye.reduction.air.acoustic_recording import reduce_acoustic
 from catseye.reduction.air.refractometer_calibration import calibrate_path
 from catseye.reduction.air.refractometer_night import read_path_readings, read_path_sheet

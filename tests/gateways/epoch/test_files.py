@@ -64,7 +64,8 @@ def test_solved_points_are_read_with_it(written):
 
 
 def test_surface_and_pose_say_the_same_from_either_file(written, tmp_path):
-    from catseye.api.telescope import pose, surface
+    from catseye.api.pose import pose
+    from catseye.api.telescope import surface
 
     inside = tmp_path / "inside"
     inside.mkdir()

@@ -82,6 +82,18 @@ def test_the_surface_has_a_row_a_prism(written, reduction):
     assert np.sqrt(np.mean(deviation**2)) == pytest.approx(reduction.surface.rms * 1e3, abs=1e-4)
 
 
+def test_the_corrections_of_a_range_add_up_to_it_and_its_phase_is_a_difference(written):
+    """As docs/formats/results.md says; 0.5 um: eight cells of four decimals, two of seven."""
+    parts = ["air", "d0", "zero", "glass", "obliquity", "leakage", "head", "moved"]
+    rows = [row for row in read(written / "ranges.csv") if row["range_m"]]
+    assert len(rows) > 600
+    for row in rows:
+        total = float(row["vacuum_length_m"]) + 1e-3 * sum(float(row[f"{part}_mm"]) for part in parts)
+        assert total == pytest.approx(float(row["range_m"]), abs=5e-7)
+        phase = float(row["phase_rad"]) - float(row["electronics_rad"]) - float(row["difference_rad"])
+        assert abs(phase - TWO_PI * round(phase / TWO_PI)) < 2e-7
+
+
 def test_every_column_of_the_ranges_has_the_unit_of_its_name(reduction):
     """In night-01 no head stands off its scan point and no shot is thin: here some do and are."""
     campaign, phases, coordinates = reduction.campaign, reduction.phases, reduction.coordinates

@@ -12,7 +12,8 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
-from catseye.gateways.journal.export import FORMAT, TABLES, export_tables, stamp
+from catseye.gateways.journal.export import FORMAT, export_tables
+from catseye.gateways.journal.tables import TABLES, stamp
 from catseye.gateways.writers import output
 from catseye.records.night.campaign import read_campaign
 from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture, LiveShot, LiveWeather

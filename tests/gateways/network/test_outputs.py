@@ -20,14 +20,18 @@ from catseye.gateways.network.comparison import (
     ComparedEpochs,
     comparison_object,
     comparison_passages,
-    displacements_csv,
 )
 from catseye.gateways.network.files import input_hashes, write_comparison, write_network
 from catseye.gateways.network.findings import findings
 from catseye.gateways.network.objects import network_json, network_object
-from catseye.gateways.network.plan import candidates_csv
 from catseye.gateways.network.summary import treatment_passages
-from catseye.gateways.network.tables import coordinates_csv, observations_csv, parameters_csv
+from catseye.gateways.network.tables import (
+    candidates_csv,
+    coordinates_csv,
+    displacements_csv,
+    observations_csv,
+    parameters_csv,
+)
 from catseye.gateways.network.xml import NAMESPACE, network_xml
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
@@ -710,4 +714,4 @@ def test_every_column_of_further_ranges_has_the_unit_of_its_name():
         "gain_um": lambda c: c.gain,
         "at_s": lambda c: c.at_s,
     }
-    assert_columns(candidates_csv(plan), told, rows)
+    assert_columns(candidates_csv(plan.plan.candidates, plan.picked), told, rows)

@@ -8,6 +8,8 @@ import pytest
 
 from catseye.errors import ValidityError
 from catseye.gateways.optics.retroreflector_figures import Dimensions, aberration_plot, return_plot
+from catseye.optics.retroreflector.kinds.ball import silvered
+from catseye.optics.retroreflector.kinds.prism import bare
 from catseye.optics.retroreflector.prism import obliquity_correction
 
 
@@ -34,7 +36,7 @@ def test_the_figures_are_well_formed_and_the_same_again(returned, aberration):
 def test_return_figure_agrees_with_the_formulas(returned):
     told = returned[1]
     half = told["half_of_normal_at_deg"]
-    solid = Dimensions().targets()[1]
+    solid = bare(Dimensions().sizes())
     for name, azimuth in (
         ("bare_prism_ranger_on_the_side_of_an_edge", 0.0),
         ("bare_prism_between_two_edges", np.pi / 3),
@@ -50,7 +52,7 @@ def test_return_figure_agrees_with_the_formulas(returned):
 
 
 def test_aberration_figure_agrees_with_the_ball(aberration):
-    told, ball = aberration[1], Dimensions().targets()[2]
+    told, ball = aberration[1], silvered(Dimensions().sizes())
     assert told["range_constant"] == ball.range_constant
     assert told["mean_path_change"] == ball.mean_path_change(0.010)
     assert replace(ball, r2=told["best_r2"]).blur(0.010) < told["blur"] < replace(ball, r2=told["focal_r2"]).blur(0.010)

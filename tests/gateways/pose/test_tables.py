@@ -5,8 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from catseye.constants import ARCSECOND
-from catseye.gateways.pose.files import points_csv
-from catseye.gateways.pose.pointing_series_files import observations_csv, tilt_csv
+from catseye.gateways.pose.tables import observations_csv, points_csv, tilt_csv
 from catseye.geometry.antenna.pointing_series import published
 from catseye.reduction.pose.pointing_fit import fit_pointing
 from catseye.reduction.pose.track_profile import track_profile
@@ -53,7 +52,8 @@ def test_every_column_of_pointing_offsets_has_the_unit_of_its_name():
     }
     left = seen - fit.series.correction(a, e)
     np.testing.assert_allclose(np.abs(fit.residual), np.abs(left), rtol=0, atol=1e-12)  # rad
-    assert_columns(observations_csv(fit, SimpleNamespace(where=where)), told, range(40))
+    found = SimpleNamespace(fit=fit, observations=SimpleNamespace(where=where))
+    assert_columns(observations_csv(found), told, range(40))
 
 
 def test_every_column_of_the_tilt_has_the_unit_of_its_name():

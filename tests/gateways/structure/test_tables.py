@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from catseye.gateways.structure.files import coefficients_csv, prediction_csv, residuals_csv, spectra_csv
+from catseye.gateways.structure.tables import coefficients_csv, prediction_csv, residuals_csv, spectra_csv
 from column_scene import assert_columns
 
 RNG = np.random.default_rng(31)

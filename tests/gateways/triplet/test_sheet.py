@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from catseye.gateways.triplet.figure import triplet_figure
-from catseye.gateways.triplet.files import triplets_csv
 from catseye.gateways.triplet.form import DATA_SHEET, HEAD, PLATE, RANGES, blank_form
 from catseye.gateways.triplet.objects import triplet_object
 from catseye.gateways.triplet.sheet import cell, html_sheet, results, text_sheet
 from catseye.gateways.triplet.symbols import PLACEMENT, UNIT, point_places, symbol_values
 from catseye.gateways.triplet.symbols import PLATE as PLATE_SYMBOLS
+from catseye.gateways.triplet.tables import triplets_csv
 from catseye.gateways.writers.drawing import svg as svg_of
 from catseye.gateways.writers.objects import json_line, plain
 from catseye.records.files.reading import read_record

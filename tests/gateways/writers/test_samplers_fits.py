@@ -8,6 +8,7 @@ import pytest
 from astropy.io import fits
 
 from catseye.errors import InputError
+from catseye.gateways.writers.columns import Column, Table
 from catseye.gateways.writers.output import PROVENANCE
 from catseye.gateways.writers.samplers_fits import (
     SamplerColumn,
@@ -161,7 +162,10 @@ def test_an_outputs_tables_are_in_the_fits_with_the_same_numbers(tmp_path):
         "point,x_m,u_x_um,slope_x_urad,m,note\nT1,1.25,3,-4,2,0.3 µm off\nT2,,4,5,-2,\n", encoding="utf-8"
     )
     six = SamplerTable("SIX", {"SHIFT": SamplerColumn("m", np.zeros((1, 3)))})
-    join_tables(tmp_path, frame="ground", pivot="1, 2, 3 m", tables={"SIX": six})
+    units = {"x_m": "m", "u_x_um": "um", "slope_x_urad": "urad"}
+    names = ("point", "x_m", "u_x_um", "slope_x_urad", "m", "note")
+    points = Table("points-left.csv", "", tuple(Column(name, units.get(name, ""), "", len) for name in names))
+    join_tables(tmp_path, [points], frame="ground", pivot="1, 2, 3 m", tables={"SIX": six})
     found = read_samplers(tmp_path / "samplers.fits")
     assert list(found) == ["SIX", "POINTS_LEFT"]
     table = found["POINTS_LEFT"]

@@ -445,7 +445,7 @@ def test_a_point_that_was_not_adjusted_is_where_the_records_put_it(night_01, red
 def test_a_face_that_looks_away_has_no_range(night_01, reduced_night_01, sight):
     place = reduced_night_01.coordinates.places[night_01.shots.target[PRISM - 1]]
     with pytest.raises(InputError, match="looks away"):
-        sight(night_01, PRISM, place=dataclasses.replace(place, normal=-place.normal))
+        sight(night_01, PRISM, place=dataclasses.replace(place, axis=-place.axis))
 
 
 def test_a_radian_is_half_a_wavelength_over_two_pi(night_01, sight):

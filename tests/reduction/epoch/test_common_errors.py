@@ -8,6 +8,7 @@ import pytest
 from catseye.atmosphere.index.air import group_refractivity
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.least_squares.adjustment import adjust
+from catseye.optics.retroreflector.kinds.registry import PRISM
 from catseye.reduction.epoch import coordinates
 from catseye.reduction.epoch.common_errors import ALIKE_M, CommonError, _smooth, common_errors, considered, reach_of
 from catseye.reduction.epoch.cycles import resolve_cycles
@@ -121,7 +122,7 @@ def test_sizes_by_hand(settled):
     unit = next(iter(network.campaign.triplets.values()))
     assert np.linalg.norm(heights[0]) == pytest.approx(unit.u_h_corr_mm * MILLIMETRE)
     from_arm = next(p for _, p in settled.shots if p.name == "ZY113")
-    at = next(k for k, t in enumerate(from_arm.target) if network.places[t].kind == "prism")
+    at = next(k for k, t in enumerate(from_arm.target) if network.places[t].kind is PRISM)
     glass = errors["group index of the glass"].shots["ZY113"]
     assert glass[at] == pytest.approx(4e-4 * network.places[from_arm.target[at]].height)
     # the night is some 11 °C: steel of 180.6 mm is 9 K * 12e-6 shorter than at 20 °C

@@ -8,6 +8,7 @@ import pytest
 from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.observations.kinds import Distances, Linear
+from catseye.optics.retroreflector.kinds.registry import HOLLOW, PRISM
 from catseye.reduction.epoch.allowance import NOTHING, for_families
 from catseye.reduction.epoch.self_check import (
     CRITICAL,
@@ -42,7 +43,7 @@ class Scene:
         self.names = (*(f"ZY{i + 101}" for i in range(RANGERS)), *(f"T{i:02d}" for i in range(TARGETS)))
         self.true = np.concatenate([ring, cloud])
         self.places = {
-            n: RangedPoint(n, "prism", p, normal=(np.array([0.6, 0.0, -0.8]) if n < "T20" else None))
+            n: RangedPoint(n, PRISM, p, np.array([0.6, 0.0, -0.8])) if n < "T20" else RangedPoint(n, HOLLOW, p)
             for n, p in zip(self.names, self.true, strict=True)
         }
         order = [(r, t) for _ in range(ROUNDS) for t in range(TARGETS) for r in range(RANGERS)]

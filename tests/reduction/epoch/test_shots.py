@@ -7,6 +7,7 @@ import pytest
 
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.least_squares.rows import full_jacobian
+from catseye.optics.retroreflector.kinds.registry import PRISM
 from catseye.optics.retroreflector.prism import obliquity_correction
 from catseye.reduction.epoch.parameter import AIR_KINDS, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
@@ -125,7 +126,7 @@ def test_a_prism_seen_straight_has_no_obliquity_and_from_behind_a_finite_one(net
 
 def test_a_faces_two_directions_lie_across_its_normal():
     for normal in np.array([[0, 0, 1.0], [0.6, 0.8, 0], [0.48, 0.6, 0.64]]):
-        across = RangedPoint("DP001", "prism", np.zeros(3), normal).across
+        across = RangedPoint("DP001", PRISM, np.zeros(3), normal).across
         np.testing.assert_allclose(across @ across.T, np.eye(2), atol=1e-15)
         np.testing.assert_allclose(across @ normal, 0.0, atol=1e-15)
 

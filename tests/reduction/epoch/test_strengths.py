@@ -9,6 +9,7 @@ import pytest
 from catseye.constants import PPM
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, adjust
 from catseye.estimation.observations.kinds import Linear
+from catseye.optics.retroreflector.kinds.registry import HOLLOW
 from catseye.reduction.epoch.air.process import LEAST, MOST, USUAL, WIDE, AirKnots, AirStrength
 from catseye.reduction.epoch.strengths import (
     ERRORS,
@@ -175,7 +176,7 @@ class Little:
 
 
 PLACES = {
-    name: RangedPoint(name, "prism", np.array(place), body="dish")
+    name: RangedPoint(name, HOLLOW, np.array(place), body="dish")
     for name, place in {"DP001": [10.0, 0.0, 60.0], "DP002": [-10.0, 5.0, 70.0]}.items()
 }
 

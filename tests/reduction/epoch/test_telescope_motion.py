@@ -5,20 +5,21 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from catseye.constants import MILLIMETRE, PPM
+from catseye.optics.retroreflector.kinds.registry import HOLLOW
 from catseye.reduction.epoch.telescope_motion import PARTS, STEP, UNITS, TelescopeKnots
 from catseye.reduction.site.places import RangedPoint
 
 PLACES = {
-    "ZY101": RangedPoint("ZY101", "ranger", np.array([120.0, 0.0, 1.0])),
-    "ZRG": RangedPoint("ZRG", "ball", np.array([-80.0, 90.0, 2.0])),
-    "ZEG": RangedPoint("ZEG", "ball", np.array([5.0, -20.0, 40.0]), body="alidade"),
-    "ZY113": RangedPoint("ZY113", "ranger", np.array([-10.0, 30.0, 100.0]), body="arm"),
-    "DP001": RangedPoint("DP001", "prism", np.array([-40.0, 10.0, 60.0]), body="dish"),
-    "DP002": RangedPoint("DP002", "prism", np.array([30.0, -20.0, 80.0]), body="dish"),
-    "DP003": RangedPoint("DP003", "prism", np.array([25.0, 40.0, 70.0]), body="dish"),
-    "DP004": RangedPoint("DP004", "prism", np.array([-5.0, -30.0, 72.0]), body="dish"),
-    "DP005": RangedPoint("DP005", "prism", np.array([8.0, 9.0, 64.0]), body="dish"),
-    "DP006": RangedPoint("DP006", "prism", np.array([-20.0, 33.0, 66.0]), body="dish"),
+    "ZY101": RangedPoint("ZY101", None, np.array([120.0, 0.0, 1.0])),
+    "ZRG": RangedPoint("ZRG", HOLLOW, np.array([-80.0, 90.0, 2.0])),
+    "ZEG": RangedPoint("ZEG", HOLLOW, np.array([5.0, -20.0, 40.0]), body="alidade"),
+    "ZY113": RangedPoint("ZY113", None, np.array([-10.0, 30.0, 100.0]), body="arm"),
+    "DP001": RangedPoint("DP001", HOLLOW, np.array([-40.0, 10.0, 60.0]), body="dish"),
+    "DP002": RangedPoint("DP002", HOLLOW, np.array([30.0, -20.0, 80.0]), body="dish"),
+    "DP003": RangedPoint("DP003", HOLLOW, np.array([25.0, 40.0, 70.0]), body="dish"),
+    "DP004": RangedPoint("DP004", HOLLOW, np.array([-5.0, -30.0, 72.0]), body="dish"),
+    "DP005": RangedPoint("DP005", HOLLOW, np.array([8.0, 9.0, 64.0]), body="dish"),
+    "DP006": RangedPoint("DP006", HOLLOW, np.array([-20.0, 33.0, 66.0]), body="dish"),
 }
 DISH = [name for name in PLACES if name.startswith("DP")]
 HOURS = 3.0

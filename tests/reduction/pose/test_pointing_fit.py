@@ -7,7 +7,8 @@ from scipy.optimize import curve_fit
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import EstimationError
 from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries, published
-from catseye.reduction.pose.pointing_fit import compare_series, fit_pointing
+from catseye.reduction.pose.pointing_fit import fit_pointing
+from catseye.reduction.pose.series_comparison import compare_series
 
 
 def sky(n=60, seed=1, low=10.0, high=80.0):

@@ -12,9 +12,9 @@ from catseye.records.network.solved_points import SolvedPoints
 from catseye.reduction.epoch.parameter import ParameterKind, point_parameters
 from catseye.reduction.live.pose import live_pose
 from catseye.reduction.live.state import Carried
+from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.pointing_offsets import cross_covariance, pointing_offset
 from catseye.reduction.pose.pose import at_posture, frame_transform, group_names, pose_of_group
-from catseye.reduction.pose.verdicts import PoseFindings, pose_verdict
 from catseye.reduction.site.places import nominal_frame, places_of
 from catseye.verdict import Verdict
 
@@ -152,7 +152,7 @@ def test_a_posture_that_contradicts_the_dish_is_reported_without_accusation(nigh
     told = replace(real, posture=(POSTURE[0] - wrong[0] * DEGREE, POSTURE[1] - wrong[1] * DEGREE))
     found = pose_of_group(told, None, at_posture(night_01, *told.posture), group="dish")
     size = wrong[1] or wrong[0] * np.cos(np.radians(30.0))
-    verdict = pose_verdict(PoseFindings(found, None))
+    verdict = PoseFindings(found).verdict
     assert verdict.word == "doubtful"
     assert said in found.posture.doubt
     assert abs(np.linalg.norm(found.posture.offset) / DEGREE - size) < 0.01
@@ -172,6 +172,6 @@ def test_a_dish_within_what_the_pointing_series_corrects_agrees_with_its_posture
 def test_a_pose_is_no_better_than_either_of_its_epochs(night_01, word, which):
     epochs = [epoch(night_01), epoch(night_01, seed=1)]
     epochs[which] = replace(epochs[which], verdict=Verdict(word, "the night was foggy"))
-    found = pose_verdict(PoseFindings(pose_of_group(*epochs, night_01, group="dish"), None))
+    found = PoseFindings(pose_of_group(*epochs, night_01, group="dish")).verdict
     assert found.word == word
     assert "the night was foggy" in found.why

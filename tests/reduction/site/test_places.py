@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from catseye.optics.retroreflector.kinds.registry import BALL, HOLLOW, PRISM
 from catseye.reduction.site.places import nominal_frame, places_of, sheet_notes
 
 
@@ -56,7 +57,7 @@ def test_in_a_triplet_the_ball_stands_h_corr_above_the_prisms_mid_point_along_th
         assert (right.start - left.start) @ along > 0.999 * t.d12_mm * 1e-3
         assert left.group == right.group == t.triplet
         assert ball.group == ""
-        assert ball.kind == "ball"
+        assert ball.kind is BALL
 
 
 def test_a_triplets_normal_looks_at_the_aim_point(night_01):
@@ -74,10 +75,10 @@ def test_places_have_kind_and_body(night_01):
     for name, place in places.items():
         assert np.isfinite(place.start).all()
         assert place.constant <= 0.0
-        assert (place.kind == "prism") == (place.normal is not None) == (place.group != "") == (place.height > 0)
-        if place.kind in ("hollow", "ranger"):
+        assert (place.kind is PRISM) == (place.normal is not None) == (place.group != "") == (place.height > 0)
+        if place.kind in (HOLLOW, None):
             assert place.constant == 0.0, name
-    assert {p.kind for p in places.values()} == {"ranger", "prism", "ball", "hollow"}
+    assert {p.kind for p in places.values()} == {None, PRISM, BALL, HOLLOW}
 
 
 def test_a_target_of_the_ground_frame_stays_where_it_was_typed(night_01):
@@ -118,7 +119,7 @@ def test_constants_are_as_uncertain_as_their_dimensions(night_01):
 
 
 def test_cubes_at_the_elevation_bearings_ride_on_the_alidade_though_typed_in_the_grounds_frame(night_01):
-    bodies = {name: place.body for name, place in places_of(night_01).items() if place.kind == "hollow"}
+    bodies = {name: place.body for name, place in places_of(night_01).items() if place.kind is HOLLOW}
     assert {bodies[n] for n in ("ZAG731P", "ZAG731D")} == {"alidade"}
     assert {bodies[b.target] for b in night_01.benchmarks} == {""}
     mast = night_01.targets["ZAG731P"].model_copy(update={"name": "MAST", "position_mm": (90e3, 70e3, 46.9e3)})

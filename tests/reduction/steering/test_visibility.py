@@ -7,11 +7,11 @@ from catseye.constants import DEGREE
 from catseye.errors import InputError
 from catseye.geometry.frames.frame import Transform
 from catseye.geometry.frames.rotation import from_vector
+from catseye.optics.retroreflector.kinds.registry import BALL, HOLLOW, KINDS, PRISM
 from catseye.optics.retroreflector.prism import clear_share
 from catseye.records.site.solids import Solids, read_solids
 from catseye.reduction.site.places import places_of
 from catseye.reduction.steering.visibility import (
-    ACCEPTANCE,
     BEAM_RADIUS,
     CLEAR_END,
     CLEAR_START,
@@ -36,7 +36,7 @@ def solids():
 def scene(night_01):
     posture = night_01.site.campaign
     frames = frames_at(posture.azimuth_deg * DEGREE, posture.elevation_deg * DEGREE)
-    rangers = {n: p.start for n, p in places_of(night_01).items() if p.kind == "ranger"}
+    rangers = {n: p.start for n, p in places_of(night_01).items() if p.kind is None}
     return rangers, retroreflectors_of(night_01), frames
 
 
@@ -98,7 +98,7 @@ def test_reasons_are_lines_that_a_person_reads(solids, scene):
     assert any(r.startswith("obstructed by 'reflector' at ") for r in reasons)
     assert any(r.startswith("incidence ") and r.endswith(" deg above 45") for r in reasons)
     assert found.seen.sum() == sum(found.reason(i, j) == "seen" for i, j in np.ndindex(found.seen.shape))
-    prisms = [k for k, kind in enumerate(targets.kinds) if kind == "prism"]
+    prisms = [k for k, kind in enumerate(targets.kinds) if kind is PRISM]
     feed_arm = [i for i, n in enumerate(rangers) if n >= "ZY113"]
     ground = [i for i, n in enumerate(rangers) if n < "ZY113"]
     # what the campaign did: feed-arm rangers look at the dish's prisms, ground rangers cannot
@@ -126,7 +126,7 @@ def test_the_order_of_reasons_and_the_limits():
     axes = np.array(
         [back, back, [-np.cos(1.1), np.sin(1.1), 0.0], back, [np.nan] * 3, [-np.cos(1.1), np.sin(1.1), 0.0]]
     )
-    kinds = ("prism", "prism", "prism", "hollow", "hollow", "ball")
+    kinds = (PRISM, PRISM, PRISM, HOLLOW, HOLLOW, BALL)
     targets = Retroreflectors(tuple("abcdef"), kinds, points, axes)
     frames = frames_at(0.3, 0.7)
     found = visibility(
@@ -150,7 +150,7 @@ def test_the_order_of_reasons_and_the_limits():
 
 def test_a_beam_is_not_a_line():
     rangers = {"A": np.array([0.0, 0.0, 0.0])}
-    targets = Retroreflectors(("t",), ("ball",), np.array([[100.0, 0, 0]]), np.array([[-1.0, 0, 0]]))
+    targets = Retroreflectors(("t",), (BALL,), np.array([[100.0, 0, 0]]), np.array([[-1.0, 0, 0]]))
     near = Solids.model_validate(
         {"sphere": [{"name": "s", "frame": "ground", "centre_mm": [50_000.0, 1005.0, 0.0], "radius_mm": 1000.0}]}
     )
@@ -161,7 +161,7 @@ def test_a_beam_is_not_a_line():
 def test_solids_move_with_their_frame():
     """A target behind a box of the alidade is hidden at one azimuth and free a quarter turn on."""
     rangers = {"A": np.array([0.0, 100.0, 10.0])}
-    targets = Retroreflectors(("t",), ("ball",), np.array([[0.0, -50.0, 10.0]]), np.array([[0.0, 1.0, 0.0]]))
+    targets = Retroreflectors(("t",), (BALL,), np.array([[0.0, -50.0, 10.0]]), np.array([[0.0, 1.0, 0.0]]))
     box = Solids.model_validate(
         {"box": [{"name": "b", "frame": "alidade", "centre_mm": [0.0, 20_000.0, 10_000.0], "size_mm": [2000.0] * 3}]}
     )
@@ -175,14 +175,14 @@ def test_solids_move_with_their_frame():
 
 
 def test_the_acceptance_follows_from_the_face():
-    for kind in ("prism", "hollow"):
-        face = ACCEPTANCE[kind]
+    for kind in (PRISM, HOLLOW):
+        face = kind.acceptance
         share = clear_share(face.limit, aperture=face.aperture, height=face.height, index=face.index)
         assert share == pytest.approx(face.least_share, abs=1e-9)
-    assert ACCEPTANCE["prism"].limit / DEGREE == pytest.approx(45.0, abs=0.3)
-    assert ACCEPTANCE["hollow"].limit / DEGREE == pytest.approx(30.2, abs=0.1)
-    assert ACCEPTANCE["ball"].limit / DEGREE == pytest.approx(80.0)
-    assert all(face.why for face in ACCEPTANCE.values())
+    assert PRISM.acceptance.limit / DEGREE == pytest.approx(45.0, abs=0.3)
+    assert HOLLOW.acceptance.limit / DEGREE == pytest.approx(30.2, abs=0.1)
+    assert BALL.acceptance.limit / DEGREE == pytest.approx(80.0)
+    assert all(kind.acceptance.why for kind in KINDS.values())
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ def test_applied_corrections_make_the_dish_a_paraboloid(every):
         assert found.measured.all()
 
 
-@pytest.mark.parametrize("count", [150, 600])
+@pytest.mark.parametrize("count", [150, pytest.param(600, marks=pytest.mark.slow)])
 def test_predicted_deviations_err_as_claimed(count):
     """Prisms left out of 2209: deviation from the paraboloid that the measured prisms' true places would give."""
     ratios, rel = [], []

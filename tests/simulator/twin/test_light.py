@@ -5,6 +5,7 @@ import pytest
 
 from catseye.constants import DEGREE
 from catseye.optics.retroreflector import cats_eye, prism
+from catseye.optics.retroreflector.kinds import registry as kinds
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, prism_delay
 from catseye.simulator.twin.light import ElectronicsWalk, acceptance, glass_way, path_waves, prism_way
@@ -13,9 +14,9 @@ from simulator.living_scene import only, rms
 
 UP = np.array([0.0, 0.0, 1.0])
 ANGLES = np.linspace(0.0, 44.0, 12) * DEGREE
-SLAB = BodyRetroreflector("prism", "dish", np.zeros(3), UP, (0.0381,), (4.0, 5.0))
-BALL = BodyRetroreflector("ball", "dish", np.zeros(3), UP, (0.050, 0.0965), (2.0, 3.0))
-HOLLOW = BodyRetroreflector("hollow", "ground", np.zeros(3), None, (), (3.0, 4.0))
+SLAB = BodyRetroreflector(kinds.PRISM, "dish", np.zeros(3), UP, (0.0381,), (4.0, 5.0))
+BALL = BodyRetroreflector(kinds.BALL, "dish", np.zeros(3), UP, (0.050, 0.0965), (2.0, 3.0))
+HOLLOW = BodyRetroreflector(kinds.HOLLOW, "ground", np.zeros(3), None, (), (3.0, 4.0))
 
 
 def test_a_prism_delays_as_the_rays_of_the_night_do():
@@ -35,13 +36,13 @@ def test_a_prism_delays_as_the_reductions_formulas_say(phase):
 
 def test_each_kind_has_its_glass():
     cosine = np.cos(ANGLES)
-    kinds = {"group": 1.527077, "phase": 1.527077}
-    assert glass_way(HOLLOW, cosine, **kinds, obliquity=1.0) == pytest.approx(np.zeros(12))
-    ball = glass_way(BALL, cosine, **kinds, obliquity=1.0)
+    index = {"group": 1.527077, "phase": 1.527077}
+    assert glass_way(HOLLOW, cosine, **index, obliquity=1.0) == pytest.approx(np.zeros(12))
+    ball = glass_way(BALL, cosine, **index, obliquity=1.0)
     assert ball == pytest.approx(np.full(12, -cats_eye.range_constant(0.050, 0.0965, 1.527077)), abs=1e-15)
-    straight = glass_way(SLAB, cosine, **kinds, obliquity=0.0)
+    straight = glass_way(SLAB, cosine, **index, obliquity=0.0)
     assert np.ptp(straight) == 0.0
-    slanted = glass_way(SLAB, cosine, **kinds, obliquity=1.0)
+    slanted = glass_way(SLAB, cosine, **index, obliquity=1.0)
     assert slanted[0] == pytest.approx(straight[0], abs=1e-15)
     assert slanted[-1] - straight[-1] > 100e-6  # at 44 degrees
 

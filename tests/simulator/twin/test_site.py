@@ -12,6 +12,7 @@ import pytest
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT
 from catseye.errors import InputError
 from catseye.geometry.mirror.mirror_path import beam_angles, path_change
+from catseye.optics.retroreflector.kinds.registry import BALL
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import read_site
 from catseye.simulator.night.air import group_refractivity_ppm
@@ -44,7 +45,7 @@ def test_the_phase_against_the_reference_is_4_pi_f_over_c_times_the_optical_path
     retro = made.scene.retros[name]
     distance = np.linalg.norm(made.point(name, 0.0)[0] - made.point(ranger, 0.0)[0])
     d0, n = made.scene.stations[ranger].d0, 1.527077
-    if retro.kind == "ball":
+    if retro.kind is BALL:
         glass = n * sum(retro.sizes) - retro.sizes[0]
     else:
         glass = (n - 1 / n) * retro.sizes[0] if retro.sizes else 0.0  # obliquity is left out

@@ -1,29 +1,31 @@
 """Index of air by a named model, checked against the model's limits.
 
-A new model is one file with a MODEL, and one line here. Carbon dioxide enters where the model has it; the others' air
-has a fixed share, given in `AirState.co2_ppm`.
+A new model is one file with a MODEL, and its name in `catseye.names`. Carbon dioxide enters where the model has it; the
+others' air has a fixed share, given in `AirState.co2_ppm`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from catseye.atmosphere.index import barrell_sears1963, ciddor_hill1999, iag1999_closed, rueger1990
 from catseye.atmosphere.index.model import IndexModel, IndexSensitivity, Kind, Partials
 from catseye.atmosphere.limit import ValidInterval, check_spreads
 from catseye.atmosphere.weather import humidity
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import ValidityError
+from catseye.names import AIR_MODEL, AIR_MODELS, AirModelName
 
-MODELS: dict[str, IndexModel] = {
-    "ciddor_hill1999": ciddor_hill1999.MODEL,
-    "rueger1990": rueger1990.MODEL,
-    "iag1999_closed": iag1999_closed.MODEL,
-    "barrell_sears1963": barrell_sears1963.MODEL,
-}
-KERNELS = {"ciddor_hill1999", "rueger1990"}  # models with a compiled form, `NAME_kernel.py`
+
+def _registered(name: AirModelName) -> IndexModel:
+    model: IndexModel = import_module(f"catseye.atmosphere.index.{name}").MODEL
+    assert model.name == name, f"atmosphere/index/{name}.py defines {model.name!r}"
+    return model
+
+
+MODELS: dict[str, IndexModel] = {name: _registered(name) for name in AIR_MODELS}
 LARGE = 200_000  # states from which loading the compiled form (0.7 s, once) pays
 
 MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the definition of a group index")
@@ -105,7 +107,7 @@ class AirState:
 
 
 def group_refractivity(
-    temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
+    temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
 ):
     """Group index of air minus one, by a named model within its limits.
 
@@ -129,7 +131,7 @@ def group_refractivity(
 
 
 def phase_refractivity(
-    temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
+    temperature_c, pressure_hpa, humidity_percent, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
 ):
     """Phase index of air minus one, by a named model within its limits.
 
@@ -147,7 +149,7 @@ def phase_refractivity(
 
 
 def group_refractivity_of_vapour(
-    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
+    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
 ):
     """Group index of air minus one from the vapour pressure.
 
@@ -167,7 +169,7 @@ def group_refractivity_of_vapour(
 
 
 def phase_refractivity_of_vapour(
-    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
+    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
 ):
     """Phase index of air minus one from the vapour pressure.
 
@@ -185,7 +187,7 @@ def phase_refractivity_of_vapour(
 
 
 def group_partials(
-    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0
+    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
 ) -> Partials:
     """Derivatives of the group index at constant vapour pressure.
 
@@ -210,7 +212,7 @@ def air(
     humidity_percent,
     *,
     wavelength_um=0.780,
-    model="ciddor_hill1999",
+    model=AIR_MODEL,
     co2_ppm=450.0,
     modulation_hz=1500e6,
 ) -> AirState:
@@ -244,7 +246,7 @@ def air_of_vapour(
     vapour_pressure_hpa,
     *,
     wavelength_um=0.780,
-    model="ciddor_hill1999",
+    model=AIR_MODEL,
     co2_ppm=450.0,
     modulation_hz=1500e6,
 ) -> AirState:
@@ -300,7 +302,7 @@ def _refractivity(weather, wavelength_um, model, co2_ppm, kind: Kind):
     Otherwise by the plain form, which reports what is invalid.
     """
     chosen = _model_named(model)
-    if model in KERNELS and np.ndim(wavelength_um) == 0 and np.ndim(co2_ppm) == 0:
+    if chosen.is_compiled and np.ndim(wavelength_um) == 0 and np.ndim(co2_ppm) == 0:
         arrays = [np.asarray(value, float) for value in weather]
         shape = np.broadcast_shapes(*(array.shape for array in arrays))
         if np.prod(shape, dtype=int) >= LARGE:
@@ -319,10 +321,7 @@ def _refractivity(weather, wavelength_um, model, co2_ppm, kind: Kind):
 
 def _kernel(model: str) -> Callable[..., Any]:
     """Compiled form of a model, imported when a large problem first needs it."""
-    if model == "rueger1990":
-        from catseye.atmosphere.index.rueger1990_kernel import refractivity
-    else:
-        from catseye.atmosphere.index.ciddor_hill1999_kernel import refractivity
+    refractivity: Callable[..., Any] = import_module(f"catseye.atmosphere.index.{model}_kernel").refractivity
     return refractivity
 
 

@@ -17,6 +17,7 @@ VAPOUR_PER_MMHG = -5.5e-8  # at 0 °C, at all wavelengths
 
 MODEL = IndexModel(
     name="barrell_sears1963",
+    label="Barrell, Sears 1963",
     source="[BARRELL39], [RUEGER90]",
     dispersion=Gases(
         RefractiveDispersion(powers=PHASE_POWERS, scale=1e-6 * ZERO_CELSIUS_K / STANDARD_HPA),

@@ -159,6 +159,8 @@ def _standard_zt(temperature_c, pressure_pa, vapour_fraction):
 # not reproduce the tables. Today's [IAPWS97] saturation changes the index of saturated air by less than 1e-10 to 30 °C.
 MODEL = IndexModel(
     name="ciddor_hill1999",
+    label="Ciddor, Hill 1999",
+    is_compiled=True,
     source="[CIDDOR99], [CIDDOR96]",
     dispersion=Gases(
         RefractiveDispersion(poles=DRY_TERMS, scale=1e-8 * _standard_zt(*STANDARD_DRY)),

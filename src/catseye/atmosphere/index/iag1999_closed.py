@@ -17,6 +17,7 @@ VAPOUR_K_PER_HPA = -11.27e-6  # [IAG99], of the vapour pressure over temperature
 
 MODEL = IndexModel(
     name="iag1999_closed",
+    label="IAG 1999, closed formula",
     source="[IAG99]",
     dispersion=Gases(
         RefractiveDispersion(

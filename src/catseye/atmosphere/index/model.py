@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from catseye.atmosphere.limit import ValidInterval
+from catseye.names import AirModelName
 
 Kind = Literal["group", "phase"]
 CO2_OF_TODAY_PPM = 450.0  # ppm, [CIDDOR96]: air for comparing models without carbon dioxide
@@ -144,7 +145,8 @@ class RefractiveDispersion:
 class IndexModel:
     """Model of the index of air.
 
-    name                   as users write it
+    name                   as users write it, and the stem of its file
+    label                  in figures
     source                 the bibliography's keys
     dispersion             of each gas
     densities              function of (temperature_c, pressure_hpa, vapour_pressure_hpa) giving each gas's factor
@@ -156,9 +158,11 @@ class IndexModel:
     limits                 argument's name -> Limit
     co2_ppm                carbon dioxide for which `dispersion` holds
     co2_slope              relative change per further ppm of the dry air's refractivity; 0: no such term
+    is_compiled            True if a compiled form, `NAME_kernel.py`, stands beside its file
     """
 
-    name: str
+    name: AirModelName
+    label: str
     source: str
     dispersion: Gases
     densities: Callable[..., Gases]
@@ -170,6 +174,7 @@ class IndexModel:
     co2_slope: float = 0.0
     vapour_uncertainty: float = 0.0
     standard: "IndexModel | None" = None
+    is_compiled: bool = False
 
     def check(self, **arguments) -> None:
         """Raise ValidityError for the first argument outside its limit."""

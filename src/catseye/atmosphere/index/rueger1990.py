@@ -105,6 +105,8 @@ def _inverse_powers_slope(coefficients, kelvin):
 # [PARKER04] eqs. 1.50-1.53 print the slopes of the example, -0.895e-6 /°C, 0.272e-6 /hPa, -0.0096e-6 /%, -4.09e-8 /hPa
 MODEL = IndexModel(
     name="rueger1990",
+    label="Rüeger 1990 (the notes)",
+    is_compiled=True,
     source="[RUEGER90], [OWENS67]",
     dispersion=Gases(DRY, VAPOUR),
     densities=density_factors,

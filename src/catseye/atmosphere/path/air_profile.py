@@ -21,6 +21,7 @@ from catseye.atmosphere.path.mean import hydrostatic_pressure_hpa, nodes_along
 from catseye.atmosphere.path.profile import HUMIDITY, PRESSURE, TEMPERATURE, Profile, ProfilePrior, ProfileReadings
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.errors import EstimationError
+from catseye.names import AIR_MODEL
 
 NODES = 8  # of a mean along a path: 1e-13 for these profiles from 1 to 150 m
 LOCAL_NODES = 12  # equal shares of a path, for local air; uncertainty up to 4 % too large at 100 m
@@ -148,7 +149,7 @@ class AirProfile:
         base = self.pressure.at(seconds, np.full(z.shape, self.z_pressure))
         return warmth, _weighed(self.temperature, self.humidity, seconds, base, self.z_pressure, z), damp
 
-    def along(self, seconds, a, b, *, wavelength_um=0.780, model="ciddor_hill1999", co2_ppm=450.0) -> PathIndex:
+    def along(self, seconds, a, b, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0) -> PathIndex:
         """Mean group refractivity of straight paths at given times, with covariance.
 
         seconds         (m,) s, as the readings'

@@ -108,7 +108,7 @@ class RoundPlanner:
         selection = None if targets is None else frozenset(targets)
         dish = tuple(r for r in self.retros.values() if r.part == "dish")
         ground = {n: r for n, r in self.retros.items() if _matters(r, selection)}
-        arm = {n: r for n, r in self.retros.items() if r.part == "dish" or (r.part != "benchmark" and r.kind != "ball")}
+        arm = {n: r for n, r in self.retros.items() if r.part not in ("benchmark", "underside")}
         self._sights = VisibleSights(site, self.vantages, ground=ground, arm=arm, solids=solids)
         self._benchmarks = {b.ranger: b.target for b in site.benchmarks}
         self._benchmarked: dict[str, int] = {}
@@ -309,4 +309,4 @@ def _matters(retro: SeenRetroreflector, selection: frozenset[str] | None) -> boo
     """True for targets of ground rangers."""
     if selection is not None:
         return retro.name in selection
-    return retro.part == "structure" or retro.kind == "ball"
+    return retro.part in ("structure", "underside")

@@ -79,11 +79,11 @@ class VisibleSights:
         stands = posture or nominal_posture(self.site)
         frame = reflector_at(self.site, stands)
         to_ground = frames_at(stands.azimuth, stands.elevation, frame)
-        table = Retroreflectors(
+        table = Retroreflectors.with_axes(
             tuple(retros),
             tuple(r.kind for r in retros.values()),
             np.array([to_ground[r.frame].points(r.point) for r in retros.values()]),
-            np.array([to_ground[r.frame].directions(r.axis) for r in retros.values()]),
+            tuple(None if r.axis is None else to_ground[r.frame].directions(r.axis) for r in retros.values()),
         )
         scan_points = {name: to_ground[v.frame].points(v.station.scan_point) for name, v in vantages.items()}
         visible = visibility(scan_points, table, self.solids, frames=to_ground, limits=self.limits)

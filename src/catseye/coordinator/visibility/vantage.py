@@ -23,9 +23,11 @@ from catseye.ranger.state import AxisSettings
 from catseye.records.night.live import TICK_SECONDS, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.mirror import Mirror
+from catseye.records.site.retroreflector import RetroreflectorKind
 from catseye.records.site.target import FrameName
 
 Frame = Literal["ground", "reflector"]
+Part = Literal["dish", "plate", "underside", "structure", "benchmark"]
 TYPED = 0.010  # m: u of a coordinate without a stated one, as in the reduction
 
 
@@ -88,20 +90,24 @@ class Vantage:
 class SeenRetroreflector:
     """A retroreflector, in its frame.
 
-    kind    as in `reduction.steering.visibility.ACCEPTANCE`
     point   (3,) m
-    axis    (3,) outward, NaN if unknown
+    axis    (3,) outward; None for a kind without one
     u       m, of each coordinate
-    part    what it belongs to
+    part    what it belongs to; a triplet has its prisms on the plate and its ball on the underside
+
+    Raises InputError for a kind with an axis that lacks it.
     """
 
     name: str
-    kind: Literal["prism", "hollow", "ball"]
+    kind: RetroreflectorKind
     frame: FrameName
     point: Array
-    axis: Array
+    axis: Array | None
     u: float
-    part: Literal["dish", "triplet", "structure", "benchmark"]
+    part: Part
+
+    def __post_init__(self) -> None:
+        self.kind.axis_of(self.name, self.axis)
 
 
 def vantages_of(site: SiteFolder) -> dict[str, Vantage]:
@@ -133,25 +139,25 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
     benches = {benchmark.target for benchmark in site.benchmarks}
     retros: dict[str, SeenRetroreflector] = {}
     for target in site.targets.values():
-        part: Literal["dish", "structure", "benchmark"] = "structure"
+        part: Part = "structure"
         if target.name in benches:
             part = "benchmark"
-        elif target.type == "prism" and target.frame == "reflector":
+        elif target.shapes_dish:
             part = "dish"
-        axis = np.full(3, np.nan) if target.normal is None else np.array(target.normal)
+        axis = None if target.normal is None else np.array(target.normal)
         point = np.array(target.position_mm) * MILLIMETRE
         retros[target.name] = SeenRetroreflector(
-            target.name, target.type, target.frame, point, axis, _u(target.u_position_mm), part
+            target.name, target.kind, target.frame, point, axis, _u(target.u_position_mm), part
         )
     for triplet in site.triplets.values():
         ball, normal = np.array(triplet.nominal_position_mm) * MILLIMETRE, np.array(triplet.normal)
         middle = ball - triplet.h_corr_mm * MILLIMETRE * normal
         half = 0.5 * triplet.d12_mm * MILLIMETRE * np.array(triplet.axis)
-        left_name, right_name, ball_name = triplet.left_prism.target, triplet.right_prism.target, triplet.ball.target
         u, frame = _u(triplet.u_position_mm), triplet.frame
-        retros[left_name] = SeenRetroreflector(left_name, "prism", frame, middle - half, normal, u, "triplet")
-        retros[right_name] = SeenRetroreflector(right_name, "prism", frame, middle + half, normal, u, "triplet")
-        retros[ball_name] = SeenRetroreflector(ball_name, "ball", frame, ball, -normal, u, "triplet")
+        for side, point in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
+            retros[side.target] = SeenRetroreflector(side.target, side.kind, frame, point, normal, u, "plate")
+        eye = triplet.ball
+        retros[eye.target] = SeenRetroreflector(eye.target, eye.kind, frame, ball, -normal, u, "underside")
     return retros
 
 

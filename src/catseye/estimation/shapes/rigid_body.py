@@ -95,6 +95,11 @@ class Transformation:
         """
         return self.pvv / self.degrees_of_freedom if self.degrees_of_freedom else float("nan")
 
+    @property
+    def converged(self) -> bool:
+        """True for a transformation without a problem."""
+        return self.status == CONVERGED
+
     def require_converged(self) -> "Transformation":
         """Return this transformation, or raise EstimationError with its status."""
         if self.status != CONVERGED:

@@ -1,23 +1,14 @@
 """Acoustic paths as JSON, tables and text."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from catseye.constants import PPM
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.written import csv_text
 
 if TYPE_CHECKING:
     from catseye.reduction.air.sound_path import AcousticPath, AcousticReduction
-
-MARK = "mjd_utc,ranger,target,temperature_c,u_temperature_c"  # the header of path_temperatures.csv
-TIMES = (
-    "mjd_utc", "ranger", "target", "file", "time_ab_s", "time_ba_s", "u_time_ab_us", "u_time_ba_us", "snr_ab_db",
-    "snr_ba_db", "temperature_c", "u_temperature_c", "wind_m_per_s", "u_wind_m_per_s", "group_refractivity_ppm",
-    "u_group_refractivity_ppm", "status",
-)  # fmt: skip
 
 
 def acoustic_object(reduction: "AcousticReduction") -> dict[str, Any]:
@@ -77,40 +68,6 @@ def _shot(path: "AcousticPath", k: int) -> dict[str, Any]:
         "u_group_refractivity": air.u_group_refractivity[k],
         "status": path.status(k),
     }
-
-
-def path_temperatures_csv(paths: Sequence["AcousticPath"]) -> str:
-    """Table that a campaign reads: one row per shot with a temperature, in time order."""
-    rows = [
-        (path.shots.mjd[k], path.sheet.ranger, path.sheet.target, path.temperatures.temperature_c[k],
-         path.temperatures.u_temperature_c[k])
-        for path in paths
-        for k in np.flatnonzero(path.used)
-    ]  # fmt: skip
-    rows.sort(key=lambda row: row[0])
-    return csv_text(MARK.split(","), [(f"{t:.8f}", a, b, f"{c:.4f}", f"{u:.4f}") for t, a, b, c, u in rows])
-
-
-def shots_csv(paths: Sequence["AcousticPath"]) -> str:
-    """Table of all shots, used or not."""
-    rows = []
-    for path in paths:
-        shots, air = path.shots, path.temperatures
-        back = np.full(len(shots.mjd), np.nan) if shots.time_ba is None else shots.time_ba
-        with np.errstate(invalid="ignore", divide="ignore"):
-            decibel = 10.0 * np.log10(shots.snr)
-        for k in range(len(shots.mjd)):
-            numbers = (
-                (shots.time_ab[k], ".9f"), (back[k], ".9f"), (shots.u_time[0, k] * 1e6, ".3f"),
-                (shots.u_time[1, k] * 1e6 if shots.time_ba is not None else np.nan, ".3f"), (decibel[0, k], ".1f"),
-                (decibel[1, k], ".1f"), (air.temperature_c[k], ".4f"), (air.u_temperature_c[k], ".4f"),
-                (air.wind[k], ".3f"), (air.u_wind[k], ".3f"), (air.group_refractivity[k] / PPM, ".4f"),
-                (air.u_group_refractivity[k] / PPM, ".4f"),
-            )  # fmt: skip
-            cells = ("" if not np.isfinite(value) else format(float(value), form) for value, form in numbers)
-            head = (f"{shots.mjd[k]:.8f}", path.sheet.ranger, path.sheet.target, shots.file[k])
-            rows.append((*head, *cells, path.status(k)))
-    return csv_text(TIMES, rows)
 
 
 def passages(reduction: "AcousticReduction") -> list[Passage]:

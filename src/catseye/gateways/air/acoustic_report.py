@@ -13,10 +13,9 @@ from catseye.constants import PPM
 from catseye.gateways.air.acoustic_figures import acoustic_figures
 from catseye.gateways.air.acoustic_objects import (
     full_object,
-    path_temperatures_csv,
-    shots_csv,
     words,
 )
+from catseye.gateways.air.tables import path_temperatures_csv, shots_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line

@@ -16,15 +16,10 @@ from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import PPM
 from catseye.gateways.writers.drawing import FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
+from catseye.names import AIR_MODEL
 
 WIDTH, HEIGHT = 9.4, 10.4  # inches
 POINTS = 121
-NAMES = {  # display names; default: the model's own
-    "ciddor_hill1999": "Ciddor, Hill 1999",
-    "rueger1990": "Rüeger 1990 (the notes)",
-    "iag1999_closed": "IAG 1999, closed formula",
-    "barrell_sears1963": "Barrell, Sears 1963",
-}
 COLOURS = {name: SERIES[i % len(SERIES)] for i, name in enumerate(MODELS)}
 DISTANCE = 100.0  # m, for the micrometres beside the bars
 UNCERTAINTIES = {
@@ -96,7 +91,7 @@ def air_plot(
     humidity_percent: float,
     *,
     wavelength_um: float = 0.780,
-    model: str = "ciddor_hill1999",
+    model: str = AIR_MODEL,
     co2_ppm: float = 450.0,
     uncertainty: StateUncertainty = CERTAIN,
 ) -> tuple[Svg, dict[str, Any]]:
@@ -178,7 +173,7 @@ def _draw(above, below, variable: Variable, state: dict[str, float], model: str,
     if np.any(u_total > formula):
         below.fill_between(x, -u_total, u_total, color=colour, alpha=0.16, lw=0, label="u with inputs")
     below.fill_between(x, -formula, formula, color=colour, alpha=0.28, lw=0, label="u of formula")
-    below.axhline(0.0, color=colour, lw=1.4, label=_name(model))
+    below.axhline(0.0, color=colour, lw=1.4, label=MODELS[model].label)
     drawn = set()
     for name in MODELS:
         if name == model:
@@ -188,14 +183,10 @@ def _draw(above, below, variable: Variable, state: dict[str, float], model: str,
             refractivity = np.full(x.shape, np.nan)
             valid = {key: np.broadcast_to(value, x.shape)[inside] for key, value in (state | {variable.key: x}).items()}
             refractivity[inside] = air(**valid, model=name).group_refractivity / PPM
-            below.plot(x, refractivity - index, color=COLOURS[name], lw=1.2, label=_name(name))
+            below.plot(x, refractivity - index, color=COLOURS[name], lw=1.2, label=MODELS[name].label)
             drawn.add(name)
     below.set_xlabel(f"{variable.name} ({variable.unit})")
     return drawn
-
-
-def _name(model: str) -> str:
-    return NAMES.get(model, model)
 
 
 def _slope(variable: Variable, state: dict[str, float], model: str) -> str:
@@ -250,11 +241,11 @@ def _key(pairs) -> tuple[list, list]:
 
 def _title(state: dict[str, float], chosen: AirState, not_drawn: list[str]) -> str:
     text = (
-        f"{_name(chosen.model)} at {state['temperature_c']:g} °C, {state['pressure_hpa']:g} hPa, "
+        f"{MODELS[chosen.model].label} at {state['temperature_c']:g} °C, {state['pressure_hpa']:g} hPa, "
         f"{state['humidity_percent']:g} %, {state['wavelength_um']:g} µm: group refractivity "
         f"{float(chosen.group_refractivity) / PPM:.3f} ppm"
     )
-    names = "; ".join(_name(name) for name in not_drawn)
+    names = "; ".join(MODELS[name].label for name in not_drawn)
     return f"{text}\nnot drawn, outside their limits: {names}" if not_drawn else text
 
 

@@ -1,7 +1,5 @@
 """Refractometer path as JSON, text, table, figure and page."""
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -12,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catseye.constants import PPM, TWO_PI
+from catseye.gateways.air.tables import series_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from catseye.reduction.air.refractometer_calibration import PathCalibration
 
 FORMAT = "catseye-refractometer-1"
-SERIES = ("mjd_utc", "section", "phase_rad", "group_refractivity_ppm", "u_group_refractivity_ppm", "temperature_c",
-          "u_temperature_c", "weather_refractivity_ppm", "residual_ppm", "standardised", "status")  # fmt: skip
 
 
 def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
@@ -164,34 +161,6 @@ def _length(calibration: "PathCalibration") -> str:
         f"(N {int(absolute.cycles)}); the weather's index implies {calibration.path_length:.6f} m "
         f"± {calibration.u_path_length * 1e3:.3f} mm"
     )
-
-
-def series_csv(calibration: "PathCalibration") -> str:
-    """Table of readings as CSV; empty cells for missing numbers."""
-    readings = calibration.readings
-    columns = (
-        [f"{v:.8f}" for v in readings.mjd_utc],
-        [str(k + 1) for k in calibration.followed.section],
-        [f"{v:.6f}" for v in calibration.followed.phase],
-        *(
-            [f"{v:.4f}" if np.isfinite(v) else "" for v in values]
-            for values in (
-                calibration.refractivity / PPM,
-                calibration.u_refractivity / PPM,
-                calibration.temperature_c,
-                calibration.u_temperature_c,
-                calibration.weather.mean / PPM,
-                calibration.residual / PPM,
-                calibration.standardised,
-            )
-        ),
-        calibration.status,
-    )
-    stream = io.StringIO(newline="")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(SERIES)
-    writer.writerows(zip(*columns, strict=True))
-    return stream.getvalue()
 
 
 def refractometer_figures(calibration: "PathCalibration") -> "dict[str, Figure]":

@@ -1,161 +1,294 @@
-"""Results as CSV: header, units in the names, one row per shot, point or prism."""
+"""Tables of a reduction: ranges.csv, coordinates.csv, surface.csv."""
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
-from catseye.gateways.writers.written import csv_text
+from catseye.gateways.writers.columns import Column, Table
 from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.range_shots import RangeShots
+from catseye.reduction.epoch.surface import DishFit
 from catseye.signal.cycles.whole import unwrapped_length
 
-RANGES = [
-    "shot",
-    "mjd_utc",
-    "ranger",
-    "target",
-    "status",
-    "reason",
-    "amplitude_v",
-    "phase_rad",
-    "u_phase_rad",
-    "electronics_rad",
-    "difference_rad",
-    "cycles",
-    "margin_mm",
-    "thin",
-    "vacuum_length_m",
-    "refractivity_ppm",
-    "air_mm",
-    "d0_mm",
-    "zero_mm",
-    "glass_mm",
-    "incidence_deg",
-    "obliquity_mm",
-    "leakage_mm",
-    "head_mm",
-    "moved_mm",
-    "range_m",
-    "u_range_mm",
-    "residual_mm",
-    "standardised",
-    "redundancy",
-    "detectable_mm",
-]
-COORDINATES = [
-    "point",
-    "kind",
-    "x_m",
-    "y_m",
-    "z_m",
-    "u_x_mm",
-    "u_y_mm",
-    "u_z_mm",
-    "cov_xy_mm2",
-    "cov_xz_mm2",
-    "cov_yz_mm2",
-    "shots",
-    "from_approximate_mm",
-]
-SURFACE = ["point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_deviation_mm", "shots"]
+PAGE = "results.md"
 
-Values = np.ndarray | Sequence[object]
-PLACES = {"_m": 7, "_mm": 4, "_rad": 7, "_v": 5, "_deg": 4, "_ppm": 5, "_mm2": 8, "_utc": 9}
-PLAIN_DECIMALS = 4  # decimals of numbers without a unit
+
+@dataclass(frozen=True, eq=False)
+class ShotRows:
+    """Source of ranges.csv: a row per shot, in the campaign's order."""
+
+    reduction: Reduction
+
+    @property
+    def ranges(self) -> RangeShots:
+        return self.reduction.coordinates.ranges
+
+    @cached_property
+    def vacuum(self) -> np.ndarray:
+        """Lengths that the adjusted phases represent in vacuum, m."""
+        half = 0.5 * SPEED_OF_LIGHT / self.reduction.campaign.site.ranging.modulation_hz
+        return unwrapped_length(self.ranges.cycles, self.ranges.phase, half)
+
+    @property
+    def d0_mm(self) -> list[float]:
+        campaign = self.reduction.campaign
+        d0 = {name: campaign.mirror_of(name).d0_mm for name in dict.fromkeys(campaign.shots.ranger)}
+        return [d0[name] for name in campaign.shots.ranger]
+
+    def adjusted(self, values: np.ndarray) -> np.ndarray:
+        """Values of the adjusted shots among all shots; NaN for the others."""
+        every = np.full(len(self.reduction.campaign.shots.shot), np.nan)
+        every[self.ranges.shot] = values
+        return every
+
+    @property
+    def thin(self) -> list[str]:
+        cells = [""] * len(self.reduction.campaign.shots.shot)
+        for k in self.ranges.shot[self.ranges.thin].tolist():
+            cells[k] = "thin"
+        return cells
+
+
+FORMS = {"m": ".7f", "mm": ".4f", "rad": ".7f", "deg": ".4f", "ppm": ".5f", "": ".4f"}  # by unit
+
+
+def _ranged(
+    name: str, unit: str, doc: str, value: Callable[[RangeShots], np.ndarray], form: str = ""
+) -> Column[ShotRows]:
+    """Column that is empty for shots without a phase or on the internal cube."""
+    return Column(name, unit, doc, lambda r: r.adjusted(value(r.ranges)), form or FORMS[unit])
+
+
+RANGES = Table[ShotRows](
+    "ranges.csv",
+    PAGE,
+    (
+        Column("shot", "", "number of the shot in shots.csv", lambda r: r.reduction.campaign.shots.shot),
+        Column("mjd_utc", "d", "time, Modified Julian Date", lambda r: r.reduction.campaign.shots.mjd_utc, ".9f"),
+        Column("ranger", "", "ranger", lambda r: r.reduction.campaign.shots.ranger),
+        Column(
+            "target",
+            "",
+            "retroreflector; `ZRG` is the ranger's internal cube",
+            lambda r: r.reduction.campaign.shots.target,
+        ),
+        Column(
+            "status",
+            "",
+            "`used`, `reference`, or why it is not used: `blocked`, `clipped`, `reflected`, ...",
+            lambda r: r.reduction.status,
+        ),
+        Column(
+            "reason",
+            "",
+            "reason of the rejection, with numbers; empty for a shot that was used",
+            lambda r: [r.reduction.rejected.get(int(shot), "") for shot in r.reduction.campaign.shots.shot],
+        ),
+        Column("amplitude_v", "V", "amplitude of the return", lambda r: r.reduction.phases.amplitude, ".5f"),
+        Column("phase_rad", "rad", "phase of the samples", lambda r: r.reduction.phases.phase, ".7f"),
+        Column(
+            "u_phase_rad",
+            "rad",
+            "standard uncertainty from the samples' noise",
+            lambda r: r.reduction.phases.u_phase,
+            ".7f",
+        ),
+        _ranged(
+            "electronics_rad",
+            "rad",
+            "phase of the ranger's electronics at the shot, by its reference shots",
+            lambda s: s.electronics % TWO_PI,
+        ),
+        _ranged("difference_rad", "rad", "phase of the path: `phase_rad` less `electronics_rad`", lambda s: s.phase),
+        _ranged(
+            "cycles", "", "whole cycles of the modulation in the path, there and back", lambda s: s.cycles + 0.0, ".0f"
+        ),
+        _ranged(
+            "margin_mm",
+            "mm",
+            "error of the approximate range, beyond its present one, that would change `cycles`",
+            lambda s: s.margin / MILLIMETRE,
+        ),
+        Column(
+            "thin",
+            "",
+            "`thin` where misfit and five standard uncertainties of the predicted range could use up the margin",
+            lambda r: r.thin,
+        ),
+        Column(
+            "vacuum_length_m",
+            "m",
+            "length that cycles and phase represent in vacuum",
+            lambda r: r.adjusted(r.vacuum),
+            ".7f",
+        ),
+        _ranged("refractivity_ppm", "ppm", "mean group refractivity along the path", lambda s: s.refractivity / PPM),
+        Column(
+            "air_mm",
+            "mm",
+            "correction for the air",
+            lambda r: r.adjusted(r.vacuum * (1.0 / (1.0 + r.ranges.refractivity) - 1.0) / MILLIMETRE),
+            ".4f",
+        ),
+        Column("d0_mm", "mm", "correction for the distance of the internal cube, D0", lambda r: r.d0_mm, ".4f"),
+        _ranged("zero_mm", "mm", "correction for the ranger's zero, as estimated", lambda s: s.zero / MILLIMETRE),
+        _ranged("glass_mm", "mm", "correction for the retroreflector's glass", lambda s: s.glass / MILLIMETRE),
+        _ranged("incidence_deg", "deg", "angle of incidence on the retroreflector", lambda s: s.incidence / DEGREE),
+        _ranged("obliquity_mm", "mm", "correction for that angle", lambda s: s.obliquity / MILLIMETRE),
+        _ranged(
+            "leakage_mm",
+            "mm",
+            "correction for signal that never left the ranger, as estimated",
+            lambda s: s.leakage / MILLIMETRE,
+        ),
+        _ranged(
+            "head_mm", "mm", "corrections for the head: axes, amplitude, cyclic terms", lambda s: s.head / MILLIMETRE
+        ),
+        _ranged(
+            "moved_mm",
+            "mm",
+            "correction to the middle of the campaign: expansion and drift of the telescope",
+            lambda s: s.moved / MILLIMETRE,
+        ),
+        _ranged("range_m", "m", "range from scan point to retroreflector", lambda s: s.range_),
+        _ranged("u_range_mm", "mm", "standard uncertainty of the range", lambda s: s.u_range / MILLIMETRE),
+        _ranged("residual_mm", "mm", "observed less adjusted", lambda s: s.residual / MILLIMETRE),
+        _ranged(
+            "standardised",
+            "",
+            "residual over its own standard deviation, w of the outlier test",
+            lambda s: s.standardised,
+        ),
+        _ranged("redundancy", "", "redundancy number, 0 (unchecked) to 1", lambda s: s.redundancy),
+        _ranged(
+            "detectable_mm",
+            "mm",
+            "smallest error that the test detects (80 % power)",
+            lambda s: s.detectable / MILLIMETRE,
+        ),
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PointRows:
+    """Source of coordinates.csv: a row per point."""
+
+    reduction: Reduction
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Covariance of each point, (n, 3, 3) mm²."""
+        return self.reduction.coordinates.joint.blocks / MILLIMETRE**2
+
+    @cached_property
+    def u(self) -> np.ndarray:
+        """Standard uncertainties, (n, 3) mm."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def moved(self) -> np.ndarray:
+        """Distances from the approximate places, m."""
+        return np.linalg.norm(self.reduction.coordinates.x - self.reduction.coordinates.start, axis=1)
+
+
+COORDINATES = Table[PointRows](
+    "coordinates.csv",
+    PAGE,
+    (
+        Column("point", "", "name", lambda r: r.reduction.coordinates.points),
+        Column(
+            "kind",
+            "",
+            "what it is: `dish prism`, `structure`, `feed-arm ranger`, `ground ranger`, `triplet ball`, ...",
+            lambda r: list(kinds_of(r.reduction).values()),
+        ),
+        Column("x_m", "m", "place in the ground frame, east", lambda r: r.reduction.coordinates.x[:, 0], ".7f"),
+        Column("y_m", "m", "place in the ground frame, north", lambda r: r.reduction.coordinates.x[:, 1], ".7f"),
+        Column("z_m", "m", "place in the ground frame, up", lambda r: r.reduction.coordinates.x[:, 2], ".7f"),
+        Column("u_x_mm", "mm", "standard uncertainty of x", lambda r: r.u[:, 0], ".4f"),
+        Column("u_y_mm", "mm", "standard uncertainty of y", lambda r: r.u[:, 1], ".4f"),
+        Column("u_z_mm", "mm", "standard uncertainty of z", lambda r: r.u[:, 2], ".4f"),
+        Column("cov_xy_mm2", "mm2", "covariance of x and y", lambda r: r.covariance[:, 0, 1], ".8f"),
+        Column("cov_xz_mm2", "mm2", "covariance of x and z", lambda r: r.covariance[:, 0, 2], ".8f"),
+        Column("cov_yz_mm2", "mm2", "covariance of y and z", lambda r: r.covariance[:, 1, 2], ".8f"),
+        Column("shots", "", "number of used shots to or from it", lambda r: r.reduction.coordinates.shots.astype(int)),
+        Column(
+            "from_approximate_mm",
+            "mm",
+            "distance from the approximate place in the campaign's files",
+            lambda r: r.moved / MILLIMETRE,
+            ".4f",
+        ),
+    ),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PrismRows:
+    """Source of surface.csv: a row per prism of the dish."""
+
+    reduction: Reduction
+    surface: DishFit
+
+    @property
+    def shots(self) -> np.ndarray:
+        coordinates = self.reduction.coordinates
+        return coordinates.shots[coordinates.rows(self.surface.names)].astype(int)
+
+
+SURFACE = Table[PrismRows](
+    "surface.csv",
+    PAGE,
+    (
+        Column("point", "", "name", lambda r: r.surface.names),
+        Column(
+            "x_dish_m", "m", "place in the fitted paraboloid's frame, x", lambda r: r.surface.fit.local[:, 0], ".7f"
+        ),
+        Column("y_dish_m", "m", "place in that frame, y", lambda r: r.surface.fit.local[:, 1], ".7f"),
+        Column(
+            "z_dish_m",
+            "m",
+            "place in that frame, along the paraboloid's axis",
+            lambda r: r.surface.fit.local[:, 2],
+            ".7f",
+        ),
+        Column(
+            "deviation_mm",
+            "mm",
+            "distance from the fitted paraboloid along its normal, positive towards the focus",
+            lambda r: r.surface.fit.deviation / MILLIMETRE,
+            ".4f",
+        ),
+        Column(
+            "u_deviation_mm",
+            "mm",
+            "standard uncertainty of the deviation",
+            lambda r: r.surface.u_deviation / MILLIMETRE,
+            ".4f",
+        ),
+        Column("shots", "", "number of used shots to or from it", lambda r: r.shots),
+    ),
+)
 
 
 def ranges_csv(reduction: Reduction) -> str:
-    """Table of every shot in the campaign's order, with every correction to its range.
-
-    vacuum_length + air + d0 + zero + glass + obliquity + leakage + head = range: the length that the phase
-    represents in vacuum, converted to air, then the constants. Cells are empty for shots without a phase or on the
-    internal cube.
-    """
-    campaign, phases, ranges = reduction.campaign, reduction.phases, reduction.coordinates.ranges
-    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
-    vacuum = unwrapped_length(ranges.cycles, ranges.phase, half)
-    air = vacuum * (1.0 / (1.0 + ranges.refractivity) - 1.0)
-    shots, count = campaign.shots, len(campaign.shots.shot)
-    d0 = {name: campaign.mirror_of(name).d0_mm for name in dict.fromkeys(shots.ranger)}
-    fields: dict[str, Values] = {
-        "shot": shots.shot,
-        "mjd_utc": shots.mjd_utc,
-        "ranger": shots.ranger,
-        "target": shots.target,
-        "status": reduction.status,
-        "reason": [reduction.rejected.get(int(number), "") for number in shots.shot],
-        "amplitude_v": phases.amplitude,
-        "phase_rad": phases.phase,
-        "u_phase_rad": phases.u_phase,
-        "d0_mm": [d0[name] for name in shots.ranger],
-    }
-    adjusted: dict[str, Values] = {
-        "electronics_rad": ranges.electronics % TWO_PI,
-        "difference_rad": ranges.phase,
-        "cycles": ranges.cycles.astype(int),
-        "margin_mm": ranges.margin / MILLIMETRE,
-        "thin": ["thin" if uncertain else "" for uncertain in ranges.thin],
-        "vacuum_length_m": vacuum,
-        "refractivity_ppm": ranges.refractivity / PPM,
-        "air_mm": air / MILLIMETRE,
-        "zero_mm": ranges.zero / MILLIMETRE,
-        "glass_mm": ranges.glass / MILLIMETRE,
-        "incidence_deg": ranges.incidence / DEGREE,
-        "obliquity_mm": ranges.obliquity / MILLIMETRE,
-        "leakage_mm": ranges.leakage / MILLIMETRE,
-        "head_mm": ranges.head / MILLIMETRE,
-        "moved_mm": ranges.moved / MILLIMETRE,
-        "range_m": ranges.range_,
-        "u_range_mm": ranges.u_range / MILLIMETRE,
-        "residual_mm": ranges.residual / MILLIMETRE,
-        "standardised": ranges.standardised,
-        "redundancy": ranges.redundancy,
-        "detectable_mm": ranges.detectable / MILLIMETRE,
-    }
-    columns = {name: _cells(name, values) for name, values in fields.items()}
-    for name, values in adjusted.items():
-        columns[name] = [""] * count
-        for k, text in zip(ranges.shot.tolist(), _cells(name, values), strict=True):
-            columns[name][k] = text
-    return csv_text(RANGES, zip(*(columns[name] for name in RANGES), strict=True))
+    """Table of every shot in the campaign's order, with every correction to its range."""
+    return RANGES.csv(ShotRows(reduction))
 
 
 def coordinates_csv(reduction: Reduction) -> str:
     """Table of every point in the ground frame, with standard uncertainties and covariances."""
-    coordinates = reduction.coordinates
-    covariance = coordinates.joint.blocks / MILLIMETRE**2
-    u = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    columns: dict[str, Values] = {
-        "point": coordinates.points,
-        "kind": list(kinds_of(reduction).values()),
-        **dict(zip(("x_m", "y_m", "z_m"), coordinates.x.T, strict=True)),
-        **dict(zip(("u_x_mm", "u_y_mm", "u_z_mm"), u.T, strict=True)),
-        "cov_xy_mm2": covariance[:, 0, 1],
-        "cov_xz_mm2": covariance[:, 0, 2],
-        "cov_yz_mm2": covariance[:, 1, 2],
-        "shots": coordinates.shots.astype(int),
-        "from_approximate_mm": np.linalg.norm(coordinates.x - coordinates.start, axis=1) / MILLIMETRE,
-    }
-    return _csv(COORDINATES, columns)
+    return COORDINATES.csv(PointRows(reduction))
 
 
 def surface_csv(reduction: Reduction) -> str:
-    """Dish prisms in the fitted paraboloid's frame.
-
-    A deviation is along the normal, positive towards the focus.
-    """
-    surface, coordinates = reduction.surface, reduction.coordinates
-    if surface is None:
-        return _csv(SURFACE, {name: [] for name in SURFACE})
-    columns: dict[str, Values] = {
-        "point": surface.names,
-        **dict(zip(("x_dish_m", "y_dish_m", "z_dish_m"), surface.fit.local.T, strict=True)),
-        "deviation_mm": surface.fit.deviation / MILLIMETRE,
-        "u_deviation_mm": surface.u_deviation / MILLIMETRE,
-        "shots": coordinates.shots[coordinates.rows(surface.names)].astype(int),
-    }
-    return _csv(SURFACE, columns)
+    """Table of the dish's prisms; no rows without a fitted surface."""
+    surface = reduction.surface
+    return SURFACE.csv(None if surface is None else PrismRows(reduction, surface))
 
 
 def kinds_of(reduction: Reduction) -> dict[str, str]:
@@ -169,27 +302,13 @@ def kinds_of(reduction: Reduction) -> dict[str, str]:
             return "fixed point"
         if name in campaign.monuments:
             return "ground ranger"
-        if places[name].kind == "ranger":
+        retroreflector = places[name].kind
+        if retroreflector is None:
             return "feed-arm ranger"
         if name in at_triplets:
-            return f"triplet {places[name].kind}"
+            return f"triplet {retroreflector.name}"
         if name in at_benchmarks:
             return "benchmark"
-        return "dish prism" if places[name].kind == "prism" else "structure"
+        return "dish prism" if retroreflector.shapes_dish else "structure"
 
     return {name: kind(name) for name in reduction.coordinates.points}
-
-
-def _csv(header: list[str], columns: dict[str, Values]) -> str:
-    cells = [_cells(name, columns[name]) for name in header]
-    return csv_text(header, zip(*cells, strict=True))
-
-
-def _cells(name: str, values: Values) -> list[str]:
-    """Numbers of a column with suitable digits; empty if not finite."""
-    places = PLACES.get(f"_{name.rpartition('_')[2]}", PLAIN_DECIMALS) if "_" in name else PLAIN_DECIMALS
-    plain = values.tolist() if isinstance(values, np.ndarray) else values
-    return [
-        (f"{value:.{places}f}" if math.isfinite(value) else "") if isinstance(value, float) else str(value)
-        for value in plain
-    ]

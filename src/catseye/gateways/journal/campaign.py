@@ -23,8 +23,9 @@ from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, Sto
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, export_verdict
-from catseye.gateways.journal.export import seal, stamp
+from catseye.gateways.journal.export import seal
 from catseye.gateways.journal.motion import JournalMotion, MotionRows
+from catseye.gateways.journal.tables import stamp
 from catseye.gateways.writers.output import atomic_directory
 from catseye.gateways.writers.written import origin
 from catseye.records.night.campaign import LONGEST_CAMPAIGN, WEATHER_MARGIN, read_campaign

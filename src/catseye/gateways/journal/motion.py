@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
-from catseye.gateways.journal.export import stamp
+from catseye.gateways.journal.tables import stamp
 from catseye.records.night.jitter import JITTER, LARGEST_MM, JitterRow
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.night.postures import NEAREST, POSTURES, PostureRow

@@ -1,6 +1,5 @@
 """Deformation between two adjusted epochs as JSON and CSV, in the axes of the first epoch's file."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,7 +12,6 @@ from catseye.estimation.deformation.congruence import VarianceFactor
 from catseye.estimation.deformation.deformation import CongruenceTest, Deformation
 from catseye.gateways.network.findings import Findings, in_file_axes
 from catseye.gateways.network.summary import verdict
-from catseye.gateways.network.tables import Formats, cell, table
 from catseye.gateways.writers.objects import plain
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.verdict import Verdict
@@ -22,14 +20,6 @@ FORMAT = "catseye-comparison-1"
 NAMED = 8  # points named in sentences
 SMALLEST = np.finfo(float).tiny  # smaller probabilities are zero in double precision
 UNTESTED = "not checked"
-DISPLACEMENTS: Formats = {
-    "point": "",
-    **dict.fromkeys(("x_m", "y_m", "z_m"), ".10f"),
-    **dict.fromkeys(("dx_mm", "dy_mm", "dz_mm", "length_mm", "u_dx_mm", "u_dy_mm", "u_dz_mm"), ".6f"),
-    **dict.fromkeys(("plain_dx_mm", "plain_dy_mm", "plain_dz_mm"), ".6f"),
-    **dict.fromkeys(("statistic", "p", "p_adjusted", "detectable_mm"), ".6g"),
-    "verdict": "",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,30 +222,4 @@ def comparison_passages(compared: ComparedEpochs) -> list[Passage]:
     words = [word for word in compared.moved.words if word != d.status]
     return passages + (
         [Passage("Assumed", " ".join(f"{word[0].upper()}{word[1:]}." for word in words))] if words else []
-    )
-
-
-def displacements_csv(compared: ComparedEpochs) -> Iterator[str]:
-    """Table of common points: coordinates, displacements, uncertainties.
-
-    compared   two epochs
-    """
-    d = compared.deformation
-    names, x = [cell(name) for name in d.names], compared.first.x[compared.rows]
-    yield from table(
-        DISPLACEMENTS,
-        len(names),
-        lambda part: [
-            names[part],
-            *x[part].T,
-            *(compared.displacement[part].T / MILLIMETRE),
-            compared.length[part] / MILLIMETRE,
-            *(compared.u[part].T / MILLIMETRE),
-            *(compared.difference[0][part].T / MILLIMETRE),
-            d.statistic[part],
-            d.p[part],
-            d.p_adjusted[part],
-            d.detectable[part] / MILLIMETRE,
-            compared.verdicts[part],
-        ],
     )

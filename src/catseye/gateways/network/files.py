@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from catseye.aliases import Progress
 from catseye.gateways.network.comparison import FORMAT as COMPARISON
-from catseye.gateways.network.comparison import ComparedEpochs, comparison_object, displacements_csv
+from catseye.gateways.network.comparison import ComparedEpochs, comparison_object
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.objects import FORMAT, network_json
-from catseye.gateways.network.tables import coordinates_csv, observations_csv, parameters_csv
+from catseye.gateways.network.tables import coordinates_csv, displacements_csv, observations_csv, parameters_csv
 from catseye.gateways.network.xml import network_xml
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, origin, write_files

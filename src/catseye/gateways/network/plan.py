@@ -16,7 +16,7 @@ from catseye.estimation.network.plan import Candidate, Plan
 from catseye.gateways.network.findings import Findings
 from catseye.gateways.network.objects import network_object
 from catseye.gateways.network.summary import direction_words, quantity
-from catseye.gateways.network.tables import coordinates_csv
+from catseye.gateways.network.tables import candidates_csv, coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.page import card, page, paragraph, section, table
 from catseye.gateways.writers.passage import Passage
@@ -212,22 +212,6 @@ def scatter_words(s: MonteCarloScatter) -> str:
     return text
 
 
-def candidates_csv(plan_findings: PlanFindings) -> Iterator[str]:
-    """Table of additional ranges, the best first, then the schedule."""
-    yield "list,from,to,u_mm,mean_u_mm,gain_um,at_s\n"
-    for name, rows in (("candidate", plan_findings.plan.candidates), ("schedule", plan_findings.picked)):
-        for c in rows:
-            at = f"{c.at_s:g}" if np.isfinite(c.at_s) else ""
-            yield (
-                f"{name},{_cell(c.from_)},{_cell(c.to)},{c.u / MILLIMETRE:.6f},{c.mean_u / MILLIMETRE:.6f},"
-                f"{c.gain * 1e6:.6f},{at}\n"
-            )
-
-
-def _cell(text: str) -> str:
-    return f'"{text.replace(chr(34), 2 * chr(34))}"' if any(c in text for c in ',"\n') else text
-
-
 def plan_report(plan_findings: PlanFindings, when: datetime, inputs: Mapping[str, str]) -> str:
     """HTML report of a planned network."""
     from catseye.gateways.network.figures import network_figures
@@ -363,7 +347,7 @@ def write_plan(
     files: Files = {
         "report.html": lambda: plan_report(plan_findings, when, inputs),
         "points.csv": lambda: "".join(coordinates_csv(plan_findings.findings)),
-        "candidates.csv": lambda: "".join(candidates_csv(plan_findings)),
+        "candidates.csv": lambda: "".join(candidates_csv(plan_findings.plan.candidates, plan_findings.picked)),
         "plan.json": lambda: json_page(plan_object(plan_findings)),
     }
     provenance = {"format": FORMAT, "made_by": "catseye plan"}

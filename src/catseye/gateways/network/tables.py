@@ -1,58 +1,230 @@
-"""Adjusted network as CSV: units in the names, in the axes of its file; written in pieces."""
+"""Tables of a network: coordinates, observations, parameters, displacements, candidates; in the axes of its file."""
 
-import csv
-import io
 from collections.abc import Callable, Iterator, Sequence
-from math import isfinite
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.network.findings import MEASURES, ROLES, Findings
+from catseye.estimation.network.plan import Candidate
+from catseye.gateways.network.findings import ROLES, Findings
+from catseye.gateways.writers.columns import Column, Table, each
 
-Formats = dict[str, str]  # number format of each column; "" for texts, "d" for integers
-Column = Sequence[str] | np.ndarray
+if TYPE_CHECKING:
+    from catseye.gateways.network.comparison import ComparedEpochs
 
-PIECE = 5_000  # rows of a piece
-COORDINATES: Formats = {
-    "point": "",
-    "x_m": ".10f",
-    "y_m": ".10f",
-    "z_m": ".10f",
-    "u_x_mm": ".7f",
-    "u_y_mm": ".7f",
-    "u_z_mm": ".7f",
-    "cov_xx_mm2": ".9e",
-    "cov_xy_mm2": ".9e",
-    "cov_xz_mm2": ".9e",
-    "cov_yy_mm2": ".9e",
-    "cov_yz_mm2": ".9e",
-    "cov_zz_mm2": ".9e",
-    "semi_axis_1_mm": ".7f",
-    "semi_axis_2_mm": ".7f",
-    "semi_axis_3_mm": ".7f",
-    "fixed": "",
-    "datum": "",
-    "observations": "d",
-}
-OBSERVATIONS: Formats = {
-    "number": "d",
-    "kind": "",
-    **dict.fromkeys(ROLES, ""),
-    "component": "",
-    "unit": "",
-    **dict.fromkeys(MEASURES, ".7g"),
-    "observed": ".13g",
-    "test": ".6g",
-    "p": ".6g",
-    "suspect": "",
-    "active": "",
-    "checked": "",
-    "group": "",
-    "place": "",
-}
-PARAMETERS: Formats = {"parameter": "", "unit": "", "value": ".13g", "u": ".7g", "prior_u": ".7g"}
-TRIANGLE = np.triu_indices(3)
+PAGE = "network.md"
+IN_UNIT = "in `unit`"
+
+
+def _letters(findings: Findings, flags: np.ndarray) -> list[str]:
+    """Letters of the file's axes that are flagged at each point."""
+    letters = np.array(findings.network.axis_names)
+    return [" ".join(letters[row]) for row in flags @ np.abs(findings.network.axes) > 0.0]
+
+
+def _mm2(row: int, column: int) -> Column[Findings]:
+    pair = "xyz"[row] + "xyz"[column]
+    doc = f"variance of {pair[0]}" if row == column else f"covariance of {pair[0]} and {pair[1]}"
+    return Column(f"cov_{pair}_mm2", "mm2", doc, lambda f: f.covariance[:, row, column] / MILLIMETRE**2, ".9e")
+
+
+def _semi_axis(k: int, word: str) -> Column[Findings]:
+    doc = f"{word} semi-axis of the standard ellipsoid"
+    return Column(f"semi_axis_{k + 1}_mm", "mm", doc, lambda f: f.ellipsoid.semi_axes[:, k] / MILLIMETRE, ".7f")
+
+
+COORDINATES = Table[Findings](
+    "coordinates.csv",
+    PAGE,
+    (
+        Column("point", "", "name", lambda f: f.names),
+        Column("x_m", "m", "adjusted x; empty where nothing determines it", lambda f: f.x[:, 0], ".10f"),
+        Column("y_m", "m", "adjusted y", lambda f: f.x[:, 1], ".10f"),
+        Column("z_m", "m", "adjusted z", lambda f: f.x[:, 2], ".10f"),
+        Column("u_x_mm", "mm", "standard uncertainty of x", lambda f: f.u[:, 0] / MILLIMETRE, ".7f"),
+        Column("u_y_mm", "mm", "standard uncertainty of y", lambda f: f.u[:, 1] / MILLIMETRE, ".7f"),
+        Column("u_z_mm", "mm", "standard uncertainty of z", lambda f: f.u[:, 2] / MILLIMETRE, ".7f"),
+        *(_mm2(row, column) for row in range(3) for column in range(row, 3)),
+        *(_semi_axis(k, word) for k, word in enumerate(("longest", "middle", "shortest"))),
+        Column("fixed", "", "axes along which it was held", lambda f: _letters(f, f.network.points.fixed)),
+        Column("datum", "", "axes along which it defined the datum", lambda f: _letters(f, f.network.points.datum)),
+        Column("observations", "", "number of its observations", lambda f: f.observation_counts),
+    ),
+    also=("points.csv", "epoch-*-coordinates.csv"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationRows:
+    """Source of observations.csv: observations in some order.
+
+    findings   findings on a solution
+    order      (m,) rows of its table
+    """
+
+    findings: Findings
+    order: np.ndarray
+
+    def measure(self, name: str) -> np.ndarray:
+        return np.asarray(getattr(self.findings.table, name)[self.order])
+
+    def ends(self, role: int) -> list[str]:
+        points = [*self.findings.names, ""]
+        return [points[i] for i in self.findings.table.ends[self.order, role]]
+
+    @property
+    def kinds(self) -> list[str]:
+        table = self.findings.table
+        return [table.kinds[k] for k in table.kind[self.order]]
+
+    @cached_property
+    def where(self) -> list[tuple[int, int]]:
+        """Group of each observation and its row there."""
+        return list(zip(self.measure("group").tolist(), self.measure("row").tolist(), strict=True))
+
+    @property
+    def places(self) -> list[str]:
+        places = self.findings.network.places
+        return [places[g][r] if places and places[g] else "" for g, r in self.where]
+
+    @property
+    def suspects(self) -> np.ndarray:
+        """Mask (m,) of the suspects."""
+        suspect = np.zeros(len(self.findings.table), dtype=bool)
+        suspect[self.findings.suspects] = True
+        return suspect[self.order]
+
+
+def _yes(flags: np.ndarray) -> list[str]:
+    return np.where(flags, "yes", "no").tolist()
+
+
+def _end(role: int, word: str) -> Column[ObservationRows]:
+    return Column(ROLES[role], "", f"{word} point", lambda o: o.ends(role))
+
+
+def _measure(name: str, doc: str, form: str = ".7g") -> Column[ObservationRows]:
+    return Column(name, "", doc, lambda o: o.measure(name), form)
+
+
+OBSERVATIONS = Table[ObservationRows](
+    "observations.csv",
+    PAGE,
+    (
+        Column("number", "", "position in the file, from 0, as in `suspects` of the JSON", lambda o: o.order),
+        Column("kind", "", "kind of observation", lambda o: o.kinds),
+        *(_end(role, word) for role, word in enumerate(("first", "second", "third", "fourth"))),
+        Column("component", "", "axis, of one coordinate of a point or vector", lambda o: o.measure("component")),
+        Column("unit", "", "`m`, `rad` or `1`", lambda o: o.measure("unit")),
+        _measure("observed", f"observed value, {IN_UNIT}", ".13g"),
+        _measure("u", f"standard uncertainty, {IN_UNIT}"),
+        _measure("residual", f"observed less adjusted, {IN_UNIT}"),
+        _measure("standardised", "residual over its own standard deviation, w"),
+        _measure("redundancy", "redundancy number, 0 (unchecked) to 1"),
+        _measure("mdb", f"minimal detectable bias: smallest error that the test detects, {IN_UNIT}"),
+        _measure("estimated_error", f"error, if this observation alone is in error, {IN_UNIT}"),
+        _measure(
+            "bias_to_noise", "largest effect of an error of size `mdb` on a result, over its standard uncertainty"
+        ),
+        _measure("effect", "largest movement of one of its points by an error of size `mdb`, m"),
+        Column("test", "", "test statistic: w, or Pope's tau", lambda o: o.findings.statistic[o.order], ".6g"),
+        Column("p", "", "p-value, corrected for the number of tests", lambda o: o.findings.p[o.order], ".6g"),
+        Column("suspect", "", "`yes` where the test rejects it", lambda o: _yes(o.suspects)),
+        Column("active", "", "`yes` where the adjustment used it", lambda o: _yes(o.measure("active"))),
+        Column("checked", "", "`yes` where other observations check it", lambda o: _yes(o.measure("checked"))),
+        Column("group", "", "group of observations", lambda o: [o.findings.network.groups[g].name for g, _ in o.where]),
+        Column("place", "", "file and line that it was read from", lambda o: o.places),
+    ),
+    also=("epoch-*-observations.csv",),
+)
+
+
+PARAMETERS = Table[Findings](
+    "parameters.csv",
+    PAGE,
+    (
+        Column("parameter", "", "name", lambda f: [p.name for p in f.network.parameters]),
+        Column("unit", "", "unit of the values", lambda f: [p.unit for p in f.network.parameters]),
+        Column(
+            "value",
+            "",
+            f"estimate, {IN_UNIT}; axes x east, y north, z up",
+            lambda f: f.solution.parameters,
+            ".13g",
+        ),
+        Column("u", "", f"standard uncertainty, {IN_UNIT}", lambda f: f.u_parameters, ".7g"),
+        Column(
+            "prior_u",
+            "",
+            f"standard uncertainty beforehand, {IN_UNIT}; empty: free, 0: held",
+            lambda f: np.array([p.sigma for p in f.network.parameters]),
+            ".7g",
+        ),
+    ),
+    also=("epoch-*-parameters.csv",),
+)
+
+
+def _axis(prefix: str, k: int, doc: str, value: "Callable[[ComparedEpochs], np.ndarray]") -> "Column[ComparedEpochs]":
+    """Column in millimetres of one axis of an (n, 3) array in metres."""
+    axis = "xyz"[k]
+    return Column(f"{prefix}{axis}_mm", "mm", f"{doc} along {axis}", lambda c: value(c)[:, k] / MILLIMETRE, ".6f")
+
+
+DISPLACEMENTS = Table["ComparedEpochs"](
+    "displacements.csv",
+    PAGE,
+    (
+        Column("point", "", "name of a point of both epochs", lambda c: c.deformation.names),
+        Column("x_m", "m", "x in the first epoch", lambda c: c.first.x[c.rows, 0], ".10f"),
+        Column("y_m", "m", "y in the first epoch", lambda c: c.first.x[c.rows, 1], ".10f"),
+        Column("z_m", "m", "z in the first epoch", lambda c: c.first.x[c.rows, 2], ".10f"),
+        *(_axis("d", k, "displacement, second epoch less first,", lambda c: c.displacement) for k in range(3)),
+        Column("length_mm", "mm", "length of the displacement", lambda c: c.length / MILLIMETRE, ".6f"),
+        *(_axis("u_d", k, "standard uncertainty of the displacement", lambda c: c.u) for k in range(3)),
+        *(_axis("plain_d", k, "plain difference of the coordinates", lambda c: c.difference[0]) for k in range(3)),
+        Column("statistic", "", "chi-square of the displacement", lambda c: c.deformation.statistic, ".6g"),
+        Column("p", "", "probability of such a statistic without movement", lambda c: c.deformation.p, ".6g"),
+        Column("p_adjusted", "", "p times the number of points tested", lambda c: c.deformation.p_adjusted, ".6g"),
+        Column(
+            "detectable_mm",
+            "mm",
+            "smallest displacement that the test detects, in its weakest direction",
+            lambda c: c.deformation.detectable / MILLIMETRE,
+            ".6g",
+        ),
+        Column("verdict", "", "`moved`, `stable`, `undecided`, `held` or `not checked`", lambda c: c.verdicts),
+    ),
+)
+
+Listed = tuple[str, Candidate]
+CANDIDATES = Table[Sequence[Listed]](
+    "candidates.csv",
+    PAGE,
+    (
+        Column(
+            "list",
+            "",
+            "`candidate`: a single further range; `schedule`: ranges in the given time, in order",
+            each(lambda r: r[0]),
+        ),
+        Column("from", "", "station", each(lambda r: r[1].from_)),
+        Column("to", "", "target", each(lambda r: r[1].to)),
+        Column("u_mm", "mm", "standard uncertainty of the range", each(lambda r: r[1].u / MILLIMETRE), ".6f"),
+        Column(
+            "mean_u_mm",
+            "mm",
+            "mean standard uncertainty of the points of interest with it, in a schedule with all before it",
+            each(lambda r: r[1].mean_u / MILLIMETRE),
+            ".6f",
+        ),
+        Column("gain_um", "um", "reduction of that mean", each(lambda r: r[1].gain * 1e6), ".6f"),
+        Column("at_s", "s", "time of completion, in a schedule", each(lambda r: r[1].at_s), "g"),
+    ),
+)
 
 
 def coordinates_csv(findings: Findings) -> Iterator[str]:
@@ -60,24 +232,7 @@ def coordinates_csv(findings: Findings) -> Iterator[str]:
 
     findings   findings on a solution; variances include its variance factor where it is `scaled`
     """
-    axes, names = np.abs(findings.network.axes), [cell(n) for n in findings.names]
-    letters = np.array([cell(n) for n in findings.network.axis_names])
-    fixed, datum = ((flags @ axes) > 0.0 for flags in (findings.network.points.fixed, findings.network.points.datum))
-    triangle = findings.covariance[:, *TRIANGLE] / MILLIMETRE**2
-    yield from table(
-        COORDINATES,
-        len(names),
-        lambda part: [
-            names[part],
-            *findings.x[part].T,
-            *(findings.u[part].T / MILLIMETRE),
-            *triangle[part].T,
-            *(findings.ellipsoid.semi_axes[part].T / MILLIMETRE),
-            [" ".join(letters[f]) for f in fixed[part]],
-            [" ".join(letters[d]) for d in datum[part]],
-            findings.observation_counts[part],
-        ],
-    )
+    return COORDINATES.pieces(findings)
 
 
 def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterator[str]:
@@ -87,80 +242,22 @@ def observations_csv(findings: Findings, *, worst_first: bool = False) -> Iterat
     worst_first   by falling |standardised|; else in file order. `number` counts from 0 in file order, as the indices
                   of `suspects` in JSON do.
     """
-    rows, places = findings.table, findings.network.places
+    rows = findings.table
     order = rows.worst_first if worst_first else np.arange(len(rows))
-    kinds, groups = [cell(k) for k in rows.kinds], [cell(g.name) for g in findings.network.groups]
-    points = [*(cell(n) for n in findings.names), ""]
-    suspect = np.zeros(len(rows), dtype=bool)
-    suspect[findings.suspects] = True
-
-    def columns(part: slice) -> list[Column]:
-        at = order[part]
-        where = list(zip(rows.group[at].tolist(), rows.row[at].tolist(), strict=True))
-        return [
-            at,
-            [kinds[k] for k in rows.kind[at]],
-            *([points[i] for i in end[at]] for end in rows.ends.T),
-            [cell(c) for c in rows.component[at].tolist()],
-            rows.unit[at].tolist(),
-            *(getattr(rows, name)[at] for name in MEASURES),
-            findings.statistic[at],
-            findings.p[at],
-            *(np.where(flag[at], "yes", "no").tolist() for flag in (suspect, rows.active, rows.checked)),
-            [groups[g] for g, _ in where],
-            [cell(places[g][r]) if places and places[g] else "" for g, r in where],
-        ]
-
-    yield from table(OBSERVATIONS, len(rows), columns)
+    return OBSERVATIONS.pieces(ObservationRows(findings, order))
 
 
 def parameters_csv(findings: Findings) -> Iterator[str]:
-    """Table of additional parameters, in x east, y north, z up; empty prior_u: free, 0: held."""
-    parameters = findings.network.parameters
-    yield from table(
-        PARAMETERS,
-        len(parameters),
-        lambda part: [
-            [cell(p.name) for p in parameters[part]],
-            [p.unit for p in parameters[part]],
-            findings.solution.parameters[part],
-            findings.u_parameters[part],
-            np.array([p.sigma for p in parameters[part]]),
-        ],
-    )
+    """Table of additional parameters, in x east, y north, z up."""
+    return PARAMETERS.pieces(findings)
 
 
-def table(formats: Formats, count: int, columns: Callable[[slice], Sequence[Column]]) -> Iterator[str]:
-    """Header and rows in pieces.
-
-    formats   number format by column name
-    count     number of rows
-    columns   function that returns the columns of a slice of rows
-    """
-    yield ",".join(formats) + "\n"
-    for low in range(0, count, PIECE):
-        part = columns(slice(low, low + PIECE))
-        codes, texts = zip(*(_column(c, f) for c, f in zip(part, formats.values(), strict=True)), strict=True)
-        template = ",".join(codes) + "\n"
-        yield "".join([template % row for row in zip(*texts, strict=True)])
+def displacements_csv(compared: "ComparedEpochs") -> Iterator[str]:
+    """Table of common points: coordinates, displacements, uncertainties."""
+    return DISPLACEMENTS.pieces(compared)
 
 
-def _column(column: Column, form: str) -> tuple[str, Sequence]:
-    """Template of a column's cells and its values; empty where a number is not finite."""
-    if not isinstance(column, np.ndarray):
-        return "%s", column
-    values = column.tolist()
-    if form == "d" or np.isfinite(column).all():
-        return f"%{form}", values
-    return "%s", [format(value, form) if isfinite(value) else "" for value in values]
-
-
-def cell(text: str) -> str:
-    """Cell, quoted where CSV needs it.
-
-    >>> cell('a "b", c'), cell("P 1")
-    ('"a ""b"", c"', 'P 1')
-    """
-    stream = io.StringIO(newline="")
-    csv.writer(stream, lineterminator="").writerow([text])
-    return stream.getvalue() if text else ""
+def candidates_csv(candidates: Sequence[Candidate], schedule: Sequence[Candidate]) -> Iterator[str]:
+    """Table of additional ranges, the best first, then the schedule."""
+    lists = (("candidate", candidates), ("schedule", schedule))
+    return CANDIDATES.pieces([(name, candidate) for name, rows in lists for candidate in rows])

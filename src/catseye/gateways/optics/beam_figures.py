@@ -1,7 +1,5 @@
 """Beam train as figure, text, JSON and files; coatings as curves."""
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,6 +10,7 @@ import numpy as np
 from catseye.aliases import Progress
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
+from catseye.gateways.optics.tables import PLACES, RETURNED
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, origin, write_files
@@ -229,40 +228,13 @@ def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str], pro
     progress    called for each file
     """
     files: Files = {
-        "beam.csv": lambda: _places_csv(beam_path),
-        "returned.csv": lambda: _returned_csv(beam_path),
+        "beam.csv": lambda: PLACES.csv(beam_path.places),
+        "returned.csv": lambda: RETURNED.csv(beam_path.returned),
         "beam.json": lambda: json_page(beam_object(beam_path)),
         "beam.svg": lambda: beam_figure(beam_path),
     }
     provenance = {"format": FORMAT, "made_by": "catseye beam", "settings": {"distance_m": beam_path.train.distance_m}}
     write_files(files, directory, {**provenance, **origin(datetime.now(UTC), inputs)}, progress=progress)
-
-
-def _places_csv(beam_path: BeamPath) -> str:
-    header = "leg,name,way_m,radius_x_m,radius_y_m,curvature_x_per_m,curvature_y_per_m,aperture_m,clipped,power_w"
-    rows = (
-        (p.leg, p.name, *map(_exact, (p.way, *p.radius, *p.curvature, p.aperture, p.clipped, p.power)))
-        for p in beam_path.places
-    )
-    return _table(header, rows)
-
-
-def _returned_csv(beam_path: BeamPath) -> str:
-    header = "distance_m,radius_x_m,radius_y_m,hit,collected,power_w,status"
-    rows = ((*map(_exact, (r.distance, *r.radius, r.hit, r.collected, r.power)), r.status) for r in beam_path.returned)
-    return _table(header, rows)
-
-
-def _table(header: str, rows: Iterator[tuple[str, ...]]) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header.split(","))
-    writer.writerows(rows)
-    return stream.getvalue()
-
-
-def _exact(value: float) -> str:
-    return f"{float(value):.10g}" if np.isfinite(value) else ""
 
 
 def _cell(value: float, form: str) -> str:

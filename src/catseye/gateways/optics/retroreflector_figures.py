@@ -9,11 +9,14 @@ from catseye.atmosphere.index.air import air
 from catseye.constants import DEGREE
 from catseye.errors import ValidityError
 from catseye.gateways.writers.drawing import FAINT, SERIES, STYLE, Figure, Svg, mpl, svg
+from catseye.names import NOTES_AIR_MODEL
 from catseye.optics.glass import index_over_air
 from catseye.optics.retroreflector import prism
 from catseye.optics.retroreflector.cats_eye import BallCatsEye, focal_radius
-from catseye.optics.retroreflector.hollow_cube import HollowCube
-from catseye.optics.retroreflector.kinds import Retroreflector
+from catseye.optics.retroreflector.kinds.ball import silvered
+from catseye.optics.retroreflector.kinds.kind import DrawnSizes
+from catseye.optics.retroreflector.kinds.prism import bare
+from catseye.optics.retroreflector.kinds.registry import KINDS
 from catseye.optics.retroreflector.solid_prism import SolidPrism
 
 WIDTH, HEIGHT = 9.4, 4.6  # inches
@@ -43,15 +46,19 @@ class Dimensions:
     vacuum_um: float = 0.780
     reflectance: float = 0.97
 
-    def targets(self) -> tuple[HollowCube, SolidPrism, BallCatsEye]:
-        """The three retroreflectors drawn."""
-        about = air(20.0, 933.0, 50.0, wavelength_um=self.vacuum_um, model="rueger1990")
+    def sizes(self) -> DrawnSizes:
+        """Sizes in metres and indices over the notes' air."""
+        about = air(20.0, 933.0, 50.0, wavelength_um=self.vacuum_um, model=NOTES_AIR_MODEL)
         n = index_over_air(self.vacuum_um, self.glass, air_phase=about.phase_index, air_group=about.group_index)
-        index = {"group": float(n.group), "phase": float(n.phase)}
-        return (
-            HollowCube(self.aperture, np.sqrt(2.0) * self.aperture, self.reflectance),
-            SolidPrism(self.height, self.aperture, **index),
-            BallCatsEye(self.r1, self.r2, self.ball_aperture, **index, mirror_reflectance=self.reflectance),
+        return DrawnSizes(
+            height=self.height,
+            aperture=self.aperture,
+            r1=self.r1,
+            r2=self.r2,
+            ball_aperture=self.ball_aperture,
+            group=float(n.group),
+            phase=float(n.phase),
+            reflectance=self.reflectance,
         )
 
 
@@ -60,30 +67,25 @@ def return_plot(dimensions: Dimensions | None = None) -> tuple[Svg, dict[str, An
 
     dimensions   of the targets; the GBT's if None
 
-    Source: `hollow_cube`, `solid_prism` and `cats_eye` in `optics.retroreflector`. Raises ValidityError for invalid
+    Source: the kinds of `optics.retroreflector.kinds`. Raises ValidityError for invalid
     sizes.
     """
-    sizes = Dimensions() if dimensions is None else dimensions
-    hollow, solid, ball = sizes.targets()
+    dimensions = dimensions or Dimensions()
+    sizes = dimensions.sizes()
+    solid, ball = bare(sizes), silvered(sizes)
     angles = np.linspace(0.0, FARTHEST_DEG, POINTS)
     incidence = angles * DEGREE
-    kinds: list[tuple[str, Retroreflector, float, str, str]] = [
-        ("hollow cube", hollow, 0.0, SERIES[0], "-"),
-        ("bare prism, ranger on the side of an edge", solid, 0.0, SERIES[1], "-"),
-        ("bare prism, between two edges", solid, np.pi / 3.0, SERIES[1], "--"),
-        ("prism with silvered faces", replace(solid, corner_reflectance=sizes.reflectance), 0.0, SERIES[3], "-"),
-        ("ball", ball, 0.0, SERIES[2], "-"),
-    ]
+    kinds = sorted(KINDS.values(), key=lambda kind: kind.curves[0].colour)
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
         figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
         share_axes, change_axes = figure.subplots(1, 2)
         half = {}
-        for name, kind, azimuth, colour, line in kinds:  # the names become keys of the summary
-            share = kind.return_share(incidence, azimuth)
-            share_axes.plot(angles, share, line, color=colour, lw=1.4, label=name)
-            half[name.replace(" ", "_").replace(",", "")] = _falls_to_half(angles, share)
+        for curve in (curve for kind in kinds for curve in kind.curves):  # their labels become keys of the summary
+            share = curve.build(sizes).return_share(incidence, curve.azimuth)
+            share_axes.plot(angles, share, curve.line, color=SERIES[curve.colour], lw=1.4, label=curve.label)
+            half[curve.label.replace(" ", "_").replace(",", "")] = _falls_to_half(angles, share)
         share_axes.set(
             xlim=(0, FARTHEST_DEG), ylim=(0, 1), xlabel="incidence (°)", ylabel="share of the light on the face"
         )
@@ -111,8 +113,7 @@ def aberration_plot(dimensions: Dimensions | None = None, *, beam_radius: float 
     """
     if not 0.0 < beam_radius < np.inf:
         raise ValidityError(f"beam_radius = {beam_radius:g} m is not above 0 and finite")
-    sizes = Dimensions() if dimensions is None else dimensions
-    ball = sizes.targets()[2]
+    ball = silvered((dimensions or Dimensions()).sizes())
     focal = replace(ball, r2=float(focal_radius(ball.r1, ball.phase)))
     best = replace(ball, r2=ball.best_radius(beam_radius))
     curves = [("actual", ball, SERIES[0], "-"), ("best", best, SERIES[2], "--"), ("focal", focal, SERIES[1], "-")]
@@ -162,17 +163,17 @@ def _falls_to_half(angles: Any, share: Any) -> float | None:
     return float(np.interp(-0.5 * share[0], -share[k - 1 : k + 1], angles[k - 1 : k + 1]))
 
 
-def _appendix_b(sizes: Dimensions, solid: SolidPrism, incidence: Any) -> Any:
+def _appendix_b(sizes: DrawnSizes, solid: SolidPrism, incidence: Any) -> Any:
     """Appendix B's change of range minus the rigorous one, m."""
     by_b = prism.obliquity_correction(sizes.height, solid.group, np.cos(incidence))
     return by_b - solid.range_change(incidence)
 
 
-def _draw_change(ax: Any, angles: Any, incidence: Any, solid: SolidPrism, sizes: Dimensions) -> None:
+def _draw_change(ax: Any, angles: Any, incidence: Any, solid: SolidPrism, sizes: DrawnSizes) -> None:
     """Draw the prism's change of range, and appendix B's departure from it on a second axis."""
     change = solid.range_change(incidence) * 1e6
     ax.plot(angles, change, color=SERIES[1], lw=1.4, label="prism: two indices (left axis)")
-    ax.axhline(0.0, color=SERIES[0], lw=1.4, label="hollow cube, ball")
+    ax.axhline(0.0, color=SERIES[0], lw=1.4, label=_unchanged())
     ax.set(xlim=(0, 45), xlabel="incidence (°)", ylabel="to add to the range (µm)")
     ax.set_title("Change of range")
     second_axis = ax.twinx()
@@ -186,6 +187,12 @@ def _draw_change(ax: Any, angles: Any, incidence: Any, solid: SolidPrism, sizes:
     handles, labels = ax.get_legend_handles_labels()
     more, texts = second_axis.get_legend_handles_labels()
     ax.legend(handles + more, labels + texts, loc="center left")
+
+
+def _unchanged() -> str:
+    """Labels of the kinds whose range does not depend on the incidence, in the order of their colours."""
+    kinds = sorted((kind for kind in KINDS.values() if not kind.is_oblique), key=lambda kind: kind.curves[0].colour)
+    return ", ".join(kind.label for kind in kinds)
 
 
 def _draw_light(ax: Any, ball: BallCatsEye, beam_radius: float) -> dict[str, float]:

@@ -17,7 +17,18 @@ from catseye.gateways.panels.objects import (
     passages,
     screws,
 )
-from catseye.gateways.panels.tables import actuators_csv, crew_csv, panels_csv, readings_csv, screws_csv
+from catseye.gateways.panels.tables import (
+    ACTUATORS,
+    CREW,
+    PANELS,
+    READINGS,
+    SCREWS,
+    actuators_csv,
+    crew_csv,
+    panels_csv,
+    readings_csv,
+    screws_csv,
+)
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import join_tables
@@ -62,7 +73,11 @@ def write_panels(work: "PanelWork", directory: Path, progress: Progress | None =
     }
     provenance = {"format": FORMAT, "made_by": "catseye panels"}
     write_files(files, directory, {**provenance, **origin(when, work.inputs)}, progress=progress)
-    join_tables(directory, frame="of each corner or panel: z the normal towards the focus")
+    join_tables(
+        directory,
+        [SCREWS, ACTUATORS, PANELS, READINGS, CREW],
+        frame="of each corner or panel: z the normal towards the focus",
+    )
 
 
 def _as_left_csv(work: "PanelWork") -> str:

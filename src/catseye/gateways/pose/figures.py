@@ -6,8 +6,8 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, nice, styled
+from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.pointing_offsets import PointingOffset
-from catseye.reduction.pose.verdicts import PoseFindings
 
 NAMED = 14  # most points with names
 LENGTH = 0.12  # length of the largest residual's arrow over the group's size

@@ -1,46 +1,29 @@
 """Files of a pose: pose.json, points.csv, report.html, provenance.json."""
 
-import csv
-import io
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.estimation.shapes.pose import Pose
 from catseye.gateways.pose.objects import (
-    FORMAT,
     beam_rows,
     pose_result_object,
     pose_rows,
     pose_words,
 )
+from catseye.gateways.pose.tables import POINTS, points_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.records.network.written_pose import GROUP_POSE
+from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.pointing_offsets import PointingOffset
-from catseye.reduction.pose.verdicts import PoseFindings, pose_verdict
-
-HEADER = (
-    "point",
-    "x_m",
-    "y_m",
-    "z_m",
-    "dx_mm",
-    "dy_mm",
-    "dz_mm",
-    "residual_x_mm",
-    "residual_y_mm",
-    "residual_z_mm",
-    "w",
-)
 
 
 def write_pose(
@@ -65,7 +48,7 @@ def write_pose(
         "pose.json": lambda: json_page(pose_result_object(result)),
         "report.html": lambda: pose_report(result, when, inputs),
     }
-    provenance = {"format": FORMAT, "made_by": "catseye pose", "settings": dict(settings)}
+    provenance = {"format": GROUP_POSE, "made_by": "catseye pose", "settings": dict(settings)}
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     pose = result.pose.pose
     pivot = f"{', '.join(f'{v:.6f}' for v in pose.pivot)} m"
@@ -80,20 +63,7 @@ def write_pose(
         frame=pose.frame,
         pivot=pivot,
     )
-    join_tables(directory, frame=pose.frame, pivot=pivot, tables={"POSE": six})
-
-
-def points_csv(result: PoseFindings) -> str:
-    """Table of points: first position, motion by the pose, residual, largest |w|."""
-    pose, places = result.pose.pose, result.pose.places
-    moved, _ = pose.displacement(places)
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(HEADER)
-    for name, x, d, r, w in zip(pose.names, places, moved, pose.motion.residual, pose.w, strict=True):
-        lengths = [*(f"{v:.6f}" for v in x), *(f"{v / MILLIMETRE:.4f}" for v in (*d, *r))]
-        writer.writerow([name, *lengths, f"{w:.2f}" if np.isfinite(w) else ""])
-    return stream.getvalue()
+    join_tables(directory, [POINTS], frame=pose.frame, pivot=pivot, tables={"POSE": six})
 
 
 def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> str:
@@ -112,7 +82,7 @@ def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str])
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(result))
     body = [
         header,
-        verdict_line(pose_verdict(result)),
+        verdict_line(result.verdict),
         section("summary", "Summary", f'<div class="cards">{"".join(_cards(group.pose))}</div>', f"<dl>{words}</dl>"),
         section(
             "pose",

@@ -1,20 +1,15 @@
 """Poses and pointing offsets as JSON and text."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
-from catseye.errors import InputError
-from catseye.estimation.shapes.pose import COMPONENTS, RIGID
-from catseye.records.files.reading import Folder
-from catseye.records.files.verdicts import stored_verdict
+from catseye.estimation.shapes.pose import COMPONENTS
+from catseye.records.network.written_pose import GROUP_POSE
+from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
 from catseye.reduction.pose.pointing_offsets import PointingOffset
-from catseye.reduction.pose.verdicts import PoseFindings, pose_status, pose_verdict
-from catseye.verdict import Verdict
-
-FORMAT = "catseye-pose-1"
 
 
 def pose_result_object(result: PoseFindings) -> dict[str, Any]:
@@ -23,8 +18,8 @@ def pose_result_object(result: PoseFindings) -> dict[str, Any]:
     posture = group.epoch.posture
     moved, _ = pose.displacement(group.places)
     return {
-        "format": FORMAT,
-        "verdict": pose_verdict(result).to_object(),
+        "format": GROUP_POSE,
+        "verdict": result.verdict.to_object(),
         "group": group.group,
         "epoch": group.epoch.campaign,
         "against": group.against,
@@ -40,7 +35,7 @@ def pose_result_object(result: PoseFindings) -> dict[str, Any]:
         "covariance": pose.covariance,
         "covariance_order": list(COMPONENTS),
         "matrix": pose.motion.matrix,
-        "status": pose_status(result),
+        "status": result.status,
         "chi2": pose.motion.pvv,
         "degrees_of_freedom": pose.motion.degrees_of_freedom,
         "p": pose.p,
@@ -101,7 +96,7 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
         ("Frame", f"{pose.frame}, rotations about the pivot ({pivot}) m"),
     ]
     if pose.motion.degrees_of_freedom:
-        fits = "moves as one" if pose.p >= RIGID else "does not move as one: check the residuals"
+        fits = "moves as one" if result.rigid else "does not move as one: check the residuals"
         passages.append(
             (
                 "Rigid",
@@ -109,8 +104,8 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
                 f"p {pose.p:.2g}: the group {fits}",
             )
         )
-    if pose_status(result) != "converged":
-        passages.append(("Status", pose_status(result)))
+    if not result.sound:
+        passages.append(("Status", result.status))
     for name, w in pose.left_out.items():
         passages.append(("Left out", f"{name}: |w| {w:.1f}, it moved separately"))
     if group.missing:
@@ -128,34 +123,16 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
     return passages
 
 
-class TiltOfPose(NamedTuple):
-    """Part of a pose for a track profile: file, azimuth (rad), turn (2,), covariance (2, 2), verdict."""
+def pose_lines(result: PoseFindings) -> list[str]:
+    """Lines of the six numbers; with a beam, of its numbers and terms."""
 
-    file: str
-    azimuth: float
-    turn: np.ndarray
-    covariance: np.ndarray
-    verdict: Verdict | None = None
+    def lines(rows: list[tuple[str, str, str, str]]) -> list[str]:
+        return [f"{'':<14}{name:<20}{value:>12} {unit:<7} u {u}" for name, value, u, unit in rows]
 
-
-def tilt_of_pose(folder: Folder, name: str) -> TiltOfPose:
-    """Rotations about the alidade's x and y from a pose.json of `catseye pose`; or InputError."""
-    import json
-
-    try:
-        stored = json.loads(folder.text(name))
-    except (ValueError, RecursionError) as problem:
-        raise InputError(f"{name}: is not JSON: {problem}") from problem
-    if not isinstance(stored, dict) or stored.get("format") != FORMAT:
-        raise InputError(f"{name}: is not a pose (expected format '{FORMAT}', as catseye pose --out writes it)")
-    if stored.get("frame") != "alidade" or not stored.get("posture"):
-        raise InputError(f"{name}: is in the frame {stored.get('frame')!r} (expected 'alidade', with its posture)")
-    try:
-        turn = np.array(stored["rotation"], dtype=float)[:2]
-        spread = np.array(stored["covariance"], dtype=float)[3:5, 3:5]
-        azimuth = float(stored["posture"]["azimuth_deg"]) * DEGREE
-    except (KeyError, TypeError, ValueError, IndexError) as problem:
-        raise InputError(f"{name}: rotation, covariance or posture cannot be read: {problem}") from problem
-    if turn.shape != (2,) or spread.shape != (2, 2) or not np.isfinite([*turn, *spread.ravel(), azimuth]).all():
-        raise InputError(f"{name}: rotation and covariance have wrong sizes (expected 3 and 6 x 6 numbers)")
-    return TiltOfPose(name, azimuth, turn, spread, stored_verdict(name, stored))
+    rows = lines(pose_rows(result))
+    if result.beam is not None:
+        rows += ["", "The beam (its correction is the opposite)", *lines(beam_rows(result.beam))]
+        for name, part in result.beam.terms.items():
+            a, b, c = part[0] / ARCSECOND, part[1] / ARCSECOND, part[2] / MILLIMETRE
+            rows.append(f"{'':<14}{name:<36}{a:+9.3f} {b:+9.3f} arcsec {c:+9.3f} mm")
+    return rows

@@ -1,24 +1,21 @@
-"""Figures of a pointing fit and of a track profile as SVG text."""
+"""Figures of a pointing fit and of a track profile."""
 
 from typing import Any
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, mpl, nice, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, nice, styled
 from catseye.reduction.pose.pointing_fit import PointingFit
 from catseye.reduction.pose.track_profile import TrackProfile
 
 TITLES = ("azimuth times cos E", "elevation")
 
 
-def fit_figures(fit: PointingFit) -> dict[str, str]:
+def fit_figures(fit: PointingFit) -> dict[str, Figure]:
     """Residuals by azimuth and elevation, on the sky, and correlations of the terms."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        drawn = {"residuals": _residuals(fit), "sky": _sky(fit), "correlation": _correlation(fit)}
-        return {name: svg(figure) for name, figure in drawn.items()}
+    with styled():
+        return {"residuals": _residuals(fit), "sky": _sky(fit), "correlation": _correlation(fit)}
 
 
 def _residuals(fit: PointingFit) -> Figure:
@@ -96,12 +93,10 @@ def _correlation(fit: PointingFit) -> Figure:
     return figure
 
 
-def track_figures(profile: TrackProfile) -> dict[str, str]:
+def track_figures(profile: TrackProfile) -> dict[str, Figure]:
     """Tilt by azimuth with uncertainty and observations, and residuals."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        return {"tilt": svg(_tilt(profile)), "left": svg(_residual_tilts(profile))}
+    with styled():
+        return {"tilt": _tilt(profile), "residuals": _residual_tilts(profile)}
 
 
 def _tilt(profile: TrackProfile) -> Figure:

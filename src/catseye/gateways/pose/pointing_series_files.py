@@ -1,6 +1,7 @@
 """Files of a pointing fit and of a track profile."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
@@ -8,54 +9,44 @@ from typing import Any
 
 import numpy as np
 
-from catseye.constants import ARCSECOND, DEGREE
+from catseye.constants import ARCSECOND
+from catseye.errors import InputError
 from catseye.gateways.pose.pointing_series_objects import (
     FORMAT,
     TRACK,
-    Observed,
     fit_object,
     fit_rows,
     fit_words,
     model_record,
     track_object,
-    track_verdict,
 )
+from catseye.gateways.pose.tables import OBSERVATIONS, TILT, observations_csv, tilt_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.verdict import verdict_line
-from catseye.gateways.writers.written import Files, csv_text, origin, write_files
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.files.toml_text import record_toml
+from catseye.records.laboratory.star_offsets import MARK as STARS
+from catseye.records.laboratory.star_offsets import star_offsets_text
 from catseye.records.site.pointing_model import FORMAT as MODEL
-from catseye.reduction.pose.pointing_fit import PointingFit, SeriesComparison
+from catseye.reduction.pose.pointing_fit import PointingFit
+from catseye.reduction.pose.series_comparison import PointingFindings
 from catseye.reduction.pose.track_profile import TrackProfile
-from catseye.reduction.pose.verdicts import fit_verdict
-
-OBSERVATIONS = (
-    "place", "azimuth_deg", "elevation_deg", "correction_azimuth_cos_e_arcsec", "correction_elevation_arcsec",
-    "residual_azimuth_cos_e_arcsec", "residual_elevation_arcsec", "w_azimuth", "w_elevation", "used",
-)  # fmt: skip
 
 
-def write_fit(
-    fit: PointingFit,
-    observed: Observed,
-    compared: SeriesComparison | None,
-    *,
-    directory: Path,
-    settings: Mapping[str, Any],
-) -> None:
+def write_fit(result: PointingFindings, *, directory: Path, settings: Mapping[str, Any]) -> None:
     """Write table, JSON, model, report, and last the provenance."""
-    when = datetime.now(UTC)
+    when, fit = datetime.now(UTC), result.fit
     files: Files = {
-        "observations.csv": lambda: observations_csv(fit, observed),
-        "pointing.json": lambda: json_page(fit_object(fit, observed, compared)),
-        "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {observed.where[0].split(' line ')[0]}")),
-        "report.html": lambda: fit_report(fit, observed, compared, when=when),
+        "observations.csv": lambda: observations_csv(result),
+        "pointing.json": lambda: json_page(fit_object(result)),
+        "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {result.observations.name}")),
+        "report.html": lambda: fit_report(result, when),
     }
     provenance = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
-    write_files(files, directory, {**provenance, **origin(when, observed.hashes)})
+    write_files(files, directory, {**provenance, **origin(when, result.hashes)})
     series = SamplerTable(
         "SERIES",
         {
@@ -65,51 +56,51 @@ def write_fit(
         },
         comment="pointing series, encoders minus sky",
     )
-    join_tables(directory, tables={"SERIES": series})
+    join_tables(directory, [OBSERVATIONS], tables={"SERIES": series})
 
 
 def write_model(fit: PointingFit, path: Path) -> None:
     """Write the series alone, atomically."""
-    with atomic_file(path, "--write", f'format = "{MODEL}"') as pieces:
+    with atomic_file(path, "model", f'format = "{MODEL}"') as pieces:
         pieces.append(record_toml(model_record(fit, path.stem)))
 
 
-def observations_csv(fit: PointingFit, observed: Observed) -> str:
-    """Table of observations with residuals."""
-    rows = [
-        (
-            where,
-            f"{fit.azimuth[k] / DEGREE:.7f}",
-            f"{fit.elevation[k] / DEGREE:.7f}",
-            *(f"{v / ARCSECOND:.4f}" for v in (*fit.observed[k], *fit.residual[k])),
-            *(f"{v:.2f}" if np.isfinite(v) else "" for v in fit.w[k]),
-            "yes" if fit.used[k] else "no",
-        )
-        for k, where in enumerate(observed.where)
-    ]
-    return csv_text(OBSERVATIONS, rows)
+def write_used_stars(result: PointingFindings, path: Path) -> None:
+    """Write the stars that were used as TPOINT text, atomically.
+
+    Raises InputError for observations without stars.
+    """
+    stars, used = result.observations.stars, result.fit.used
+    if stars is None:
+        raise InputError(f"stars {path}: there are no stars in poses (expected a TPOINT file)")
+    columns = ("azimuth", "elevation", "azimuth_encoder", "elevation_encoder", "auxiliary")
+    selected = replace(stars, **{name: getattr(stars, name)[used] for name in columns})
+    with atomic_file(path, "stars", STARS) as pieces:
+        pieces.append(star_offsets_text(selected))
 
 
-def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison | None, *, when: datetime) -> str:
+def fit_report(result: PointingFindings, when: datetime) -> str:
     """HTML report of a pointing fit."""
     from catseye.gateways.pose.pointing_series_figures import fit_figures  # matplotlib is heavy
+    from catseye.gateways.writers.drawing import svgs
 
-    drawn = fit_figures(fit)
-    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in fit_words(fit, observed, compared))
+    fit = result.fit
+    drawn = svgs(fit_figures(fit))
+    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in fit_words(result))
     u = np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND
     cards = [
         card(term, f"{value:+.2f}″", f"u = {w:.2f}″")
         for term, value, w in zip(fit.series.terms, fit.series.values / ARCSECOND, u, strict=True)
     ]
-    heads = ["term", "arcsec", "u"] + (["minus the other", "u"] if compared is not None else [])
+    heads = ["term", "arcsec", "u"] + (["minus the other", "u"] if result.comparison is not None else [])
     body = [
-        _header(f"Pointing series from {observed.source}", when),
-        verdict_line(fit_verdict(fit)),
+        _header(f"Pointing series from {result.observations.source}", when),
+        verdict_line(fit.verdict),
         section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
         section(
             "terms",
             "Terms",
-            table(heads, fit_rows(fit, compared), "t" + "n" * (len(heads) - 1)),
+            table(heads, fit_rows(result), "t" + "n" * (len(heads) - 1)),
             paragraph("ΔA cos E = CA + NPAE sin E + IA cos E + AW cos A sin E + AN sin A sin E;"),
             paragraph("ΔE = −IE − AW sin A + AN cos A + HZCZ sin E + HZSZ cos E: encoders minus sky."),
             picture(drawn["correlation"], "Correlations: terms near ±1 cannot be separated by these directions."),
@@ -120,7 +111,7 @@ def fit_report(fit: PointingFit, observed: Observed, compared: SeriesComparison 
             picture(drawn["residuals"], "Residuals by azimuth and elevation."),
             picture(drawn["sky"], "The same on the sky, the zenith in the middle."),
         ),
-        _provenance(observed.hashes, when),
+        _provenance(result.hashes, when),
     ]
     return page("catseye: pointing", "\n".join(body))
 
@@ -154,20 +145,7 @@ def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str
     settings = {"harmonics": profile.series.harmonics}
     provenance = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
     write_files(files, directory, {**provenance, **origin(when, hashes)})
-    join_tables(directory, frame="alidade rotated about east and north of the ground")
-
-
-def tilt_csv(profile: TrackProfile) -> str:
-    """Table of the tilt every five degrees; columns name undetermined parts, which are excluded."""
-    azimuth = np.arange(0.0, 360.0, 5.0)
-    tilt, spread = profile.series.at(azimuth * DEGREE)
-    rows = [
-        [f"{a:.1f}", *(f"{v / ARCSECOND:.4f}" for v in (*t, q[0, 0] ** 0.5, q[1, 1] ** 0.5))]
-        for a, t, q in zip(azimuth, tilt, spread, strict=True)
-    ]
-    part = "_without_wave_1" if profile.series.undetermined else ""
-    heads = ("azimuth_deg", *(f"{q}{part}_arcsec" for q in ("tilt_east", "tilt_north", "u_east", "u_north")))
-    return csv_text(heads, rows)
+    join_tables(directory, [TILT], frame="alidade rotated about east and north of the ground")
 
 
 def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
@@ -177,6 +155,11 @@ def track_rows(profile: TrackProfile) -> list[tuple[str, str, str]]:
         (name, f"{v / ARCSECOND:+.3f}", f"{w:.3f}") if np.isfinite(v) else (name, "-", "-")
         for name, v, w in zip(profile.series.names, profile.series.values, u, strict=True)
     ]
+
+
+def track_lines(profile: TrackProfile) -> list[str]:
+    """Lines of the coefficients."""
+    return [f"{'':<14}{name:<16}{value:>10} arcsec   u {u}" for name, value, u in track_rows(profile)]
 
 
 def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
@@ -218,19 +201,20 @@ def _tilt_caption(profile: TrackProfile) -> str:
 def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
     """HTML report of a track profile."""
     from catseye.gateways.pose.pointing_series_figures import track_figures  # matplotlib is heavy
+    from catseye.gateways.writers.drawing import svgs
 
-    drawn = track_figures(profile)
+    drawn = svgs(track_figures(profile))
     words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in track_words(profile))
     body = [
         _header("Track and azimuth bearing", when),
-        verdict_line(track_verdict(profile)),
+        verdict_line(profile.verdict),
         section("summary", "Summary", f"<dl>{words}</dl>"),
         section(
             "tilt",
             "Tilt by azimuth",
             picture(drawn["tilt"], _tilt_caption(profile)),
             table(("coefficient", "arcsec", "u"), track_rows(profile), "tnn"),
-            picture(drawn["left"], "Residuals of poses and inclinometer."),
+            picture(drawn["residuals"], "Residuals of poses and inclinometer."),
         ),
         _provenance(hashes, when),
     ]

@@ -1,60 +1,30 @@
 """Counts of a mirror as text, JSON, and in the format of CAL.EQ."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.gateways.writers.verdict import Verdict, worst
+from catseye.gateways.writers.output import atomic_file
 from catseye.geometry.sky.time_tag import utc_text
 from catseye.reduction.site.stations import Pointings
+from catseye.reduction.steering.aiming import AimedPoints
 from catseye.reduction.steering.guard import GuardAnswer
 from catseye.reduction.steering.sighting import Sighting
-from catseye.reduction.steering.visibility import Visibility
 
 MARK = "# catseye point"
 HEADINGS = ("x", "y", "z", "range", "N_a", "N_e", "autocoll.", "back retro", "N_a'", "N_e'", "allowed")
 UNITS = ("m", "m", "m", "m", "counts", "counts", "counts", "counts", "counts", "counts", "")
 
 
-def point_verdict(
-    pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None, point: int
-) -> Verdict:
-    """Verdict on one of the points: mirror position allowed and target visible."""
-    if not (pointings.allowed[point] or pointings.prime_allowed[point]):
-        return Verdict("failed", "beyond the mirror's stops in both pointings")
-    if sightings:
-        refused = [a for a in (sightings[point].sun, sightings[point].keep_out) if a is not None and not a.allowed]
-        if refused:
-            return Verdict("failed", refused[0].reason.rstrip("."))
-    if visibility is not None and not visibility.seen[0, point]:
-        return Verdict("failed", visibility.reason(0, point).rstrip("."))
-    if unusual := pointings.unusual(point):
-        return Verdict("doubtful", unusual)
-    which = "direct" if pointings.allowed[point] else "prime"
-    unknown = "; u of the counts is unknown: the records lack its inputs" if pointings.lacking else ""
-    return Verdict("good", f"allowed in the {which} pointing{unknown}")
-
-
-def pointing_verdict(pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None) -> Verdict:
-    """Worst verdict of all points, with its place if there are several."""
-    verdicts = [point_verdict(pointings, sightings, visibility, k) for k in range(len(pointings.to))]
-    verdict = worst(verdicts)
-    if len(verdicts) < 2 or verdict.word == "good":
-        return verdict
-    place = ", ".join(f"{v:g}" for v in pointings.to[verdicts.index(verdict)])
-    bad = sum(v.word == verdict.word for v in verdicts)
-    return Verdict(verdict.word, f"{bad} of {len(verdicts)} points, first ({place}): {verdict.why}")
-
-
-def pointing_objects(
-    pointings: Pointings, sightings: list[Sighting], visibility: Visibility | None = None
-) -> list[dict[str, Any]]:
+def pointing_objects(aimed: AimedPoints) -> list[dict[str, Any]]:
     """Objects of the points, SI keys; `sun`, `keep_out` and `visibility` if requested."""
+    pointings, sightings, visibility = aimed.pointings, aimed.sightings, aimed.visibility
     answer = []
     for k, to in enumerate(pointings.to):
         item: dict[str, Any] = {
-            "verdict": point_verdict(pointings, sightings, visibility, k).to_object(),
+            "verdict": aimed.verdict_of(k).to_object(),
             "to": to.tolist(),
             "range": float(pointings.aim.range[k]),
             "theta": float(pointings.aim.theta[k]),
@@ -131,8 +101,9 @@ def _allowed(direct: bool, prime: bool) -> str:
     return {(True, True): "both", (True, False): "direct", (False, True): "prime"}.get((direct, prime), "neither")
 
 
-def pointing_remarks(pointings: Pointings, sightings: list[Sighting], visible: Visibility | None = None) -> list[str]:
+def pointing_remarks(aimed: AimedPoints) -> list[str]:
     """Remarks beyond the table, one line each."""
+    pointings, sightings, visible = aimed.pointings, aimed.sightings, aimed.visibility
     remarks = []
     if pointings.lacking:
         remarks.append(f"u of the counts unknown: the records do not have {', '.join(pointings.lacking)}")
@@ -162,3 +133,9 @@ def output_dat(pointings: Pointings, name: str) -> str:
     for to, counts, face in zip(pointings.to / MILLIMETRE, pointings.counts, pointings.autocollimation, strict=True):
         lines.append(" ".join([*(f"{v:11.1f}" for v in to), *(f"{v:9.1f}" for v in (*counts, face))]))
     return "\n".join(lines) + "\n"
+
+
+def write_output_dat(pointings: Pointings, name: str, path: Path) -> None:
+    """Write CAL.EQ's output.dat, atomically."""
+    with atomic_file(path, "counts", MARK) as pieces:
+        pieces.append(output_dat(pointings, name))

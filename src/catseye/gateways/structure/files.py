@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from catseye.aliases import Progress
-from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.structure.figures import motion_figure, residual_figure, spectrum_figure
 from catseye.gateways.structure.objects import (
     FORMAT,
@@ -16,11 +16,12 @@ from catseye.gateways.structure.objects import (
     vibration_object,
     vibration_samplers,
 )
+from catseye.gateways.structure.tables import coefficients_csv, prediction_csv, residuals_csv, spectra_csv
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
 from catseye.gateways.writers.verdict import Verdict, verdict_line
-from catseye.gateways.writers.written import Files, cell, csv_text, origin, write_files
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.series import Prediction, StructureFit
 from catseye.reduction.structure.vibration import Vibration
@@ -81,66 +82,6 @@ def write_vibration(
     provenance = {"format": FORMAT, "made_by": "catseye structure --vibration", "start_mjd_utc": zero_mjd}
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     join_samplers(directory, SAMPLERS, vibration_samplers(vibration, zero_mjd))
-
-
-def coefficients_csv(fit: StructureFit) -> str:
-    """Table of the group's shift and rotation per unit of each function."""
-    six, q = fit.six_of()
-    u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
-    names = [f"shift_{a}_mm" for a in "xyz"] + [f"turn_{a}_arcsec" for a in "xyz"]
-    units = np.repeat([MILLIMETRE, ARCSECOND], 3)
-    rows = [
-        (name, *(f"{v:.6f}" for v in six[:, k] / units), *(f"{v:.6f}" for v in u[:, k] / units))
-        for k, name in enumerate(fit.model.functions)
-    ]
-    return csv_text(("function", *names, *(f"u_{name}" for name in names)), rows)
-
-
-def residuals_csv(fit: StructureFit, check: LeaveOut | None) -> str:
-    """Table of residuals of every point and epoch, with and without the epoch in the fit."""
-    s = fit.series
-    e, warm = (np.asarray(v, dtype=float) for v in (s.posture.elevation, s.posture.temperature_c))
-    head = ["epoch", "mjd_utc", "elevation_deg", "temperature_c", "way", "point"]
-    head += [f"residual_{a}_mm" for a in "xyz"]
-    head += [f"left_out_{a}_mm" for a in "xyz"] + [f"u_left_out_{a}_mm" for a in "xyz"] if check is not None else []
-    rows = []
-    for t, p in zip(*np.nonzero(np.isfinite(fit.fit.residual).all(axis=2)), strict=True):
-        row = [
-            s.labels[t],
-            cell(s.mjd[t], ".8f"),
-            f"{e[t] / DEGREE:.6f}",
-            cell(warm[t], ".3f"),
-            f"{s.way[t]:+.0f}",
-        ]
-        row += [s.names[p], *(f"{v:.4f}" for v in fit.fit.residual[t, p] / MILLIMETRE)]
-        if check is not None:
-            row += [cell(v, ".4f") for v in check.residual[t, p] / MILLIMETRE]
-            row += [cell(v, ".4f") for v in np.sqrt(np.diag(check.covariance[t, p])) / MILLIMETRE]
-        rows.append(row)
-    return csv_text(head, rows)
-
-
-def prediction_csv(predicted: Prediction, request: Mapping[str, Any]) -> str:
-    """Table of predicted points."""
-    rows = []
-    for k, e in enumerate(request["elevation_deg"]):
-        for i, name in enumerate(predicted.names):
-            u = np.sqrt(np.diag(predicted.covariance[k, i])) / MILLIMETRE
-            place = (f"{v:.7f}" for v in predicted.place[k, i])
-            rows.append((f"{e:.6f}", cell(request["temperature_c"], ".3f"), name, *place, *(f"{v:.4f}" for v in u)))
-    head = ("elevation_deg", "temperature_c", "point", "x_m", "y_m", "z_m", "u_x_mm", "u_y_mm", "u_z_mm")
-    return csv_text(head, rows)
-
-
-def spectra_csv(vibration: Vibration) -> str:
-    """Table of densities with their confidence bands."""
-    f, density, band = vibration.spectrum.frequency_hz, vibration.spectrum.density, vibration.spectrum.interval(0.95)
-    rows = [
-        (s.name, f"{x:.6f}", f"{density[k, a]:.6e}", f"{band[k, a, 0]:.6e}", f"{band[k, a, 1]:.6e}")
-        for a, s in enumerate(vibration.series)
-        for k, x in enumerate(f)
-    ]
-    return csv_text(("series", "frequency_hz", "density_m2_per_hz", "low_95_m2_per_hz", "high_95_m2_per_hz"), rows)
 
 
 def _structure_page(

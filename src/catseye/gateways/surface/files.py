@@ -18,6 +18,11 @@ from catseye.gateways.surface.objects import (
 from catseye.gateways.surface.report import surface_report
 from catseye.gateways.surface.tables import (
     ACTUATOR_MARK,
+    ACTUATORS,
+    EPOCHS,
+    LOOKUP,
+    PRISMS,
+    ZERNIKE,
     actuators_csv,
     actuators_table,
     change_csv,
@@ -26,6 +31,7 @@ from catseye.gateways.surface.tables import (
     prisms_csv,
     zernike_csv,
 )
+from catseye.gateways.writers.columns import Table
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
@@ -76,7 +82,8 @@ def write_surface(
     outputs: Files = files
     provenance = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(result.shapes[-1].settings)}
     write_files(outputs, directory, {**provenance, **origin(when, inputs)}, progress=progress)
-    join_tables(directory, frame="fitted paraboloid: vertex at its origin, axis along z")
+    written: list[Table[Any]] = [PRISMS, ZERNIKE, LOOKUP, EPOCHS, ACTUATORS]
+    join_tables(directory, written, frame="fitted paraboloid: vertex at its origin, axis along z")
 
 
 def write_actuators(result: SurfaceFindings, path: Path) -> None:

@@ -1,28 +1,20 @@
 """Files of triplet calibrations: a sheet for each as text, page and JSON, and one table."""
 
-import csv
-import io
-import math
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from catseye.aliases import Progress
 from catseye.errors import InputError
 from catseye.gateways.calibrations.certificate_record import FORMAT
 from catseye.gateways.triplet.objects import triplet_object
 from catseye.gateways.triplet.sheet import html_sheet, text_sheet
+from catseye.gateways.triplet.tables import triplets_csv
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import PROVENANCE
 from catseye.gateways.writers.written import origin, write_files
 from catseye.reduction.triplet.result import TripletReduction
-
-COLUMNS = (
-    "file", "triplet", "h_corr_mm", "u_h_corr_mm", "l_mpbc_mm", "u_l_mpbc_mm", "difference_mm", "u_difference_mm",
-    "accepted", "conformity_probability", "placements", "p",
-)  # fmt: skip
 
 
 def write_triplets(
@@ -69,34 +61,3 @@ def refuse_namesakes(paths: list[Path]) -> None:
                 f"{path}: has the name of {by_stem[path.stem]} (expected sheets of different names in one output)"
             )
         by_stem[path.stem] = path
-
-
-def triplets_csv(units: Mapping[str, TripletReduction]) -> str:
-    """One row per unit, lengths in mm; an empty cell is unknown.
-
-    units   calibrations by the name of their sheet
-    """
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows(_row(file, reduction) for file, reduction in units.items())
-    return stream.getvalue()
-
-
-def _row(file: str, f: TripletReduction) -> tuple[Any, ...]:
-    lengths = (f.h_corr, f.u_h_corr, f.l_mpbc, f.u_l_mpbc, f.difference, f.u_difference)
-    millimetres = (_plain(1e3 * x) for x in lengths)
-    accepted = "yes" if f.accepted else "no"
-    return (
-        file,
-        f.measurement.triplet,
-        *millimetres,
-        accepted,
-        _plain(f.conformity_probability),
-        len(f.h),
-        _plain(f.p),
-    )
-
-
-def _plain(value: float) -> str:
-    return f"{value:.6f}" if math.isfinite(value) else ""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import deferred
+from catseye.interruption import deferred
 
 logging.getLogger("matplotlib").setLevel(logging.ERROR)  # it announces its font cache on stderr
 with deferred():  # its first import writes that cache under a lock file

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.writers.interruption import Unfinished, deferred, undo_on_interruption
+from catseye.interruption import Unfinished, deferred, undo_on_interruption
 
 PROVENANCE = "provenance.json"
 PAGES = (".html", ".htm")

@@ -10,7 +10,7 @@ import csv
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.errors import InputError
+from catseye.gateways.writers.columns import Table
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import PROVENANCE, write_atomically
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD
@@ -27,17 +28,7 @@ from catseye.version import __version__
 MARK = "CATSEYE"  # keyword of the version; identifies a file of catseye
 TIME = "MJD"
 SAMPLERS = "samplers.fits"
-UNITS = {
-    "m": "m",
-    "mm": "mm",
-    "um": "um",
-    "rad": "rad",
-    "urad": "urad",
-    "deg": "deg",
-    "arcsec": "arcsec",
-    "s": "s",
-    "hz": "Hz",
-}
+UNITS = {"m", "mm", "um", "rad", "urad", "deg", "arcsec", "s", "Hz"}  # those of CSV columns that become TUNIT
 NOT_ASCII = {"°": " deg", "µ": "u", "″": " arcsec", "′": " arcmin", "·": "*", "–": "-", "−": "-", "±": "+-"}
 STANDARD = {"XTENSION", "BITPIX", "NAXIS", "NAXIS1", "NAXIS2", "PCOUNT", "GCOUNT", "TFIELDS", "END", "EXTNAME"}
 OURS = {"TIMESYS", "MJDREF", "ORIGIN", "FRAME", "PIVOT", "REMARK", "CHECKSUM", "DATASUM", MARK}
@@ -139,35 +130,41 @@ def join_samplers(directory: Path, name: str, tables: Mapping[str, SamplerTable]
 
 
 def join_tables(
-    directory: Path, *, frame: str = "", pivot: str = "", tables: Mapping[str, SamplerTable] | None = None
+    directory: Path,
+    written: Iterable[Table[Any]],
+    *,
+    frame: str = "",
+    pivot: str = "",
+    tables: Mapping[str, SamplerTable] | None = None,
 ) -> None:
     """Add all CSV tables of an output directory as samplers.fits, with the same numbers.
 
     directory      as for `join_samplers`
+    written        definitions of the tables
     frame, pivot   of the tables, as in `SamplerTable`
     tables         additional tables, written first
     """
     joined = dict(tables or {})
+    units = {column.name: column.unit for table in written for column in table.columns}
     for path in sorted(directory.glob("*.csv")):
         name = path.stem.upper().replace("-", "_")
-        joined[name] = _of_csv(name, path.read_text(encoding="utf-8"), frame, pivot)
+        joined[name] = _of_csv(name, path.read_text(encoding="utf-8"), units, (frame, pivot))
     join_samplers(directory, SAMPLERS, joined)
 
 
-def _of_csv(name: str, text: str, frame: str, pivot: str) -> SamplerTable:
-    """Table of a CSV: units from column names, NaN for blanks, text for non-numeric columns."""
+def _of_csv(name: str, text: str, units: Mapping[str, str], where: tuple[str, str]) -> SamplerTable:
+    """Table of a CSV: NaN for blanks, text for non-numeric columns; `where`: frame and pivot."""
     header, *rows = csv.reader(io.StringIO(text))
     columns = {}
     for k, title in enumerate(header):
         cells = [row[k] for row in rows]
         try:
             values: ArrayLike = np.array([float(cell) if cell else np.nan for cell in cells])
-            what, _, unit = title.rpartition("_")
-            unit = UNITS.get(unit, "") if what else ""
+            unit = units[title] if units[title] in UNITS else ""
         except ValueError:
             values, unit = np.array([_as_ascii(cell) for cell in cells]), ""
         columns[title.upper()] = SamplerColumn(unit, values)
-    return SamplerTable(name, columns, comment=f"as {name.lower()}.csv", frame=frame, pivot=pivot)
+    return SamplerTable(name, columns, comment=f"as {name.lower()}.csv", frame=where[0], pivot=where[1])
 
 
 def _as_ascii(text: str) -> str:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.optics.retroreflector.hollow_cube import HollowCube
-from catseye.optics.retroreflector.kinds import RIGHT, Sectors, incidences
+from catseye.optics.retroreflector.interface import RIGHT, Sectors, incidences
 from catseye.optics.retroreflector.solid_prism import SolidPrism
 
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.aliases import Array
 from catseye.errors import ValidityError
-from catseye.optics.retroreflector.kinds import (
+from catseye.optics.retroreflector.interface import (
     RIGHT,
     Sectors,
     fresnel,

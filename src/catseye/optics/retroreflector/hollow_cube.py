@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from catseye.aliases import Array
 from catseye.optics.retroreflector.corner_polarization import hollow_corner, sector_jones, sector_shares
-from catseye.optics.retroreflector.kinds import RIGHT, Sectors, incidences, refuse_shares, refuse_sizes
+from catseye.optics.retroreflector.interface import RIGHT, Sectors, incidences, refuse_shares, refuse_sizes
 from catseye.optics.retroreflector.prism import clear_share
 
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from catseye.aliases import Array
 from catseye.optics.retroreflector import prism
 from catseye.optics.retroreflector.corner_polarization import sector_jones, sector_shares, solid_corner
-from catseye.optics.retroreflector.kinds import (
+from catseye.optics.retroreflector.interface import (
     RIGHT,
     Sectors,
     fresnel,

@@ -6,12 +6,13 @@ Format: docs/formats/triplet.md; quantities: [GOLDMAN00] sections 2.2 and 2.3.
 import math
 from dataclasses import dataclass
 from datetime import date
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from catseye.constants import TWO_PI
+from catseye.names import AirModelName
 from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.record import (
     Certificate,
@@ -187,7 +188,7 @@ class TripletMeasurement(Certificate):
     bk7_group_index: Annotated[float, Within(1.3, 2.5)] | None = None
     modulation_hz: Annotated[float, Within(1e8, 1e10)]
     wavelength_um: Annotated[float, Within(0.36, 1.7)]
-    air_model: Literal["ciddor_hill1999", "rueger1990", "iag1999_closed", "barrell_sears1963"]
+    air_model: AirModelName
     d12_mm: Annotated[float, ReadingRange("mm", 100.0, 5000.0)]
     u_d12_mm: Uncertainty
     u_lateral_mm: Annotated[float, Within(0, 10)] = 0.05

@@ -9,16 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from catseye.constants import DEGREE
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.records.files.covariance_file import part_of, stored_covariance
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.files.verdicts import stored_verdict
+from catseye.records.network.written_pose import FILE as POSE_FILE
+from catseye.records.network.written_pose import NIGHT_POSE, read_written_pose
 from catseye.verdict import Verdict
 
-FORMAT = "catseye-reduction-1"  # of coordinates.json and pose.json
-FILE, POSE_FILE = "coordinates.json", "pose.json"
+FORMAT = "catseye-reduction-1"  # of coordinates.json
+FILE = "coordinates.json"
 DRAWN = 1e-6  # of two standard uncertainties' product: largest asymmetry of a printed covariance
 
 
@@ -92,10 +93,19 @@ def read_solved_points(path: Path | str) -> SolvedPoints:
     x = np.array([[_number(name, n, points[n], axis) for axis in "xyz"] for n in names])
     covariance = _covariance(name, stored_covariance(document, folder.directory, len(order)), len(order))
     pose_file = folder.directory / POSE_FILE
-    posture = _posture(_object(folder, POSE_FILE)) if pose_file.is_file() else None
+    pose = read_written_pose(pose_file, expected=(NIGHT_POSE,), folder=folder) if pose_file.is_file() else None
     hashes = {f"{path.name}/{f}" if path.is_dir() else f: digest for f, digest in folder.hashes.items()}
     judged = stored_verdict(name, document)
-    return SolvedPoints(str(path), str(document.get("campaign", "")), names, x, covariance, posture, hashes, judged)
+    return SolvedPoints(
+        file=str(path),
+        campaign=str(document.get("campaign", "")),
+        names=names,
+        x=x,
+        covariance=covariance,
+        posture=None if pose is None else pose.posture,
+        hashes=hashes,
+        verdict=judged,
+    )
 
 
 def _object(folder: Folder, name: str) -> dict[str, Any]:
@@ -132,13 +142,3 @@ def _covariance(file: str, rows: Any, size: int) -> np.ndarray:
     if np.any(np.diag(q) < 0.0) or np.any(np.abs(q - q.T) > DRAWN * scale + 1e-30):
         raise refusal(file, "covariance is not symmetric or has a negative variance (expected a covariance, m^2)")
     return 0.5 * (q + q.T)
-
-
-def _posture(document: dict[str, Any]) -> tuple[float, float] | None:
-    posture = document.get("nominal_posture")
-    if not isinstance(posture, dict):
-        return None
-    angles: list[Any] = [posture.get(key) for key in ("azimuth_deg", "elevation_deg")]
-    if any(isinstance(v, bool) or not isinstance(v, int | float) or not math.isfinite(v) for v in angles):
-        raise refusal(POSE_FILE, f"nominal_posture = {shown(posture)} (expected azimuth_deg and elevation_deg)")
-    return float(angles[0]) * DEGREE, float(angles[1]) * DEGREE

@@ -1,16 +1,20 @@
 """Pointing series with covariance as a TOML file: catseye-pointing-series-1."""
 
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from catseye.constants import ARCSECOND
-from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries
+from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries, published
+from catseye.records.files.reading import Folder, read_record
 from catseye.records.files.record import Certificate, Within, broken_rule
 from catseye.verdict import Verdict, Word
 
 FORMAT = "catseye-pointing-series-1"
+PUBLISHED = "published"  # name of the published series
 SYMMETRY = 1e-6  # of two standard uncertainties' product: files carry ten digits
 Term = Literal["IA", "IE", "CA", "NPAE", "AW", "AN", "HZCZ", "HZSZ"]
 Row = Annotated[tuple[float, ...], Field(strict=False)]
@@ -59,6 +63,31 @@ class PointingModel(Certificate):
         stored = self.covariance_arcsec2
         q = np.zeros((k, k)) if stored is None else np.array(stored) * ARCSECOND**2
         return PointingSeries(tuple(self.terms), values, q)
+
+
+@dataclass(frozen=True, eq=False)
+class NamedSeries:
+    """Pointing series with its origin.
+
+    name      "published", or the model's file or name
+    verdict   of the fit; None where unknown
+    hashes    SHA-256 of the file by its name; none without a file
+    """
+
+    name: str
+    series: PointingSeries
+    verdict: Verdict | None = None
+    hashes: dict[str, str] = field(default_factory=dict)
+
+
+def read_series(model: Path | str) -> NamedSeries:
+    """Pointing series of a model's TOML file, or "published"."""
+    if str(model) == PUBLISHED:
+        return NamedSeries(PUBLISHED, published())
+    path = Path(model)
+    folder = Folder(path.parent)
+    record = folder.record(path.name, PointingModel) if path.suffix == ".toml" else read_record(path, PointingModel)
+    return NamedSeries(str(model), record.series, record.judged, dict(folder.hashes))
 
 
 def _refuse_covariance(rows: tuple[tuple[float, ...], ...], k: int) -> None:

@@ -5,28 +5,32 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from catseye.names import SingleRetroreflectorName
 from catseye.records.files.record import Name, Position, Record, Uncertainty, UnitVector, Version, Within, broken_rule
+from catseye.records.site.retroreflector import GlassForm, RetroreflectorKind, kind_named
 
 FrameName = Literal["ground", "alidade", "reflector"]
 PrismHeight = Annotated[float, Within(5, 500)]  # mm
 PrismReference = Annotated[float, Within(2, 500)]  # mm
 GlassConstant = Annotated[float, Within(-2000, -1)]  # mm; negative, since light is slower in glass
 SQUARE = 2e-3  # cosine: directions are written with three digits or more
+GLASS_KEYS = ("material", "height_mm", "u_height_mm", "hrp_mm", "pc_mm")  # of a kind behind a plane face
 PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each coordinate
 
 
 class TargetRow(Record):
-    """Retroreflector; the keys from normal on are for prisms only.
+    """Single retroreflector; its kind says which keys it has.
 
     position_mm     approximate, in the named frame
     u_position_mm   of each coordinate; by default the reduction's setting, 10 mm
-    normal          outward normal of the entry face, same frame
+    normal          outward axis, same frame, of a kind that has one: normal of a prism's entry face
+    material        of a prism
     height_mm, u_height_mm   of the prism; hrp_mm from the entry face down to the reference point
     pc_mm           prism constant, negative
     """
 
     name: Name
-    type: Literal["prism", "hollow"]
+    type: SingleRetroreflectorName
     frame: FrameName
     position_mm: Position
     u_position_mm: PositionUncertainty | None = None
@@ -37,14 +41,27 @@ class TargetRow(Record):
     hrp_mm: PrismReference | None = None
     pc_mm: GlassConstant | None = None
 
+    @property
+    def kind(self) -> RetroreflectorKind:
+        """Kind of retroreflector that its type names."""
+        return kind_named(self.type)
+
+    @property
+    def shapes_dish(self) -> bool:
+        """True for a target on the dish's surface, by kind and frame."""
+        return self.kind.shapes_dish and self.frame == "reflector"
+
     @model_validator(mode="after")
     def _has_the_keys_of_its_type(self) -> "TargetRow":
-        for key in ("material", "normal", "height_mm", "u_height_mm", "hrp_mm", "pc_mm"):
+        in_glass = self.kind.glass is GlassForm.SLAB
+        needed = {"normal": self.kind.has_axis} | dict.fromkeys(GLASS_KEYS, in_glass)
+        for key in ("material", "normal", *GLASS_KEYS[1:]):
             value = getattr(self, key)
-            if self.type == "prism" and value is None:
-                raise broken_rule(f"{key} is missing (expected for type = 'prism')")
-            if self.type == "hollow" and value is not None:
-                raise broken_rule(f"{key} = {value!r} belongs to a prism (expected none for type = 'hollow')")
+            if needed[key] and value is None:
+                raise broken_rule(f"{key} is missing (expected for type = {self.type!r})")
+            if not needed[key] and value is not None:
+                owner = "a prism" if key in GLASS_KEYS else "a kind with an axis"
+                raise broken_rule(f"{key} = {value!r} belongs to {owner} (expected none for type = {self.type!r})")
         if self.height_mm is not None and self.hrp_mm is not None:
             refuse_deep_reference(self.hrp_mm, self.height_mm)
         return self

@@ -15,6 +15,7 @@ from catseye.records.files.record import (
     Within,
     broken_rule,
 )
+from catseye.records.site.retroreflector import BALL, PRISM, RetroreflectorKind
 from catseye.records.site.target import (
     FrameName,
     GlassConstant,
@@ -38,6 +39,11 @@ class TripletPrism(Record):
     hrp_mm: PrismReference
     pc_mm: GlassConstant
 
+    @property
+    def kind(self) -> RetroreflectorKind:
+        """Kind of the retroreflector: a prism."""
+        return PRISM
+
     @model_validator(mode="after")
     def _refers_to_a_point_in_the_glass(self) -> "TripletPrism":
         refuse_deep_reference(self.hrp_mm, self.height_mm)
@@ -52,6 +58,11 @@ class TripletBall(Record):
     r2_mm: Annotated[float, Within(5, 1000)]
     u_r_mm: Uncertainty
     pc_b_mm: GlassConstant
+
+    @property
+    def kind(self) -> RetroreflectorKind:
+        """Kind of the retroreflector: a ball."""
+        return BALL
 
     @model_validator(mode="after")
     def _focuses_on_its_large_sphere(self) -> "TripletBall":

@@ -20,6 +20,7 @@ from catseye.atmosphere.sound.path import WIND, bent_ray_excess, pair, straight_
 from catseye.atmosphere.sound.speed import MODELS, THERMOMETRY, Sound, model_named, sound, temperatures_c
 from catseye.atmosphere.weather import humidity
 from catseye.errors import ValidityError
+from catseye.names import AIR_MODEL
 
 USED = "used"
 NO_TIME = "no travel time"
@@ -125,7 +126,7 @@ def path_temperatures(
     station: StationAir,
     wind: PathWind,
     wavelength_um: float = 0.780,
-    air_model: str = "ciddor_hill1999",
+    air_model: str = AIR_MODEL,
 ) -> PathTemperatures:
     """Mean temperature along a path from travel times of sound.
 

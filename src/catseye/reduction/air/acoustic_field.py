@@ -19,6 +19,7 @@ from catseye.atmosphere.sound.dispersion import dispersion
 from catseye.atmosphere.sound.speed import THERMOMETRY, model_named, sound, temperatures_c
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.shapes.tomography import FieldPrior, LineMeans, Lines, Tomogram, tomogram
+from catseye.names import AIR_MODEL
 from catseye.reduction.air.acoustic import LENGTH, NO_TIME, OUTSIDE, USED, StationAir
 
 PASSES = 6  # the wind is subtracted from the speed exactly, again with each better wind
@@ -91,7 +92,7 @@ class SoundField:
         return self.used[self.tomogram.suspects]
 
     def along(
-        self, start: ArrayLike, end: ArrayLike, *, wavelength_um: float = 0.780, air_model: str = "ciddor_hill1999"
+        self, start: ArrayLike, end: ArrayLike, *, wavelength_um: float = 0.780, air_model: str = AIR_MODEL
     ) -> LineAir:
         """Temperature, wind and group refractivity along straight lines.
 

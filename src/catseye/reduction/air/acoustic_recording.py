@@ -12,6 +12,7 @@ import numpy as np
 from catseye.atmosphere.sound.speed import THERMOMETRY, sound
 from catseye.constants import SECONDS_PER_DAY, TWO_PI, ZERO_CELSIUS_K
 from catseye.errors import InputError, ValidityError
+from catseye.names import AIR_MODEL
 from catseye.records.files.refusal import refusal
 from catseye.records.night.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
 from catseye.reduction.air.acoustic import PathTemperatures, PathWind, SoundLine, StationAir, path_temperatures
@@ -29,7 +30,7 @@ def reduce_acoustic(
     sheet: Path | None = None,
     *,
     model: str = THERMOMETRY,
-    air_model: str = "ciddor_hill1999",
+    air_model: str = AIR_MODEL,
 ) -> AcousticReduction:
     """Temperatures of paths from files of sound or travel times.
 

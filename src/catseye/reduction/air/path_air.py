@@ -21,6 +21,7 @@ from catseye.atmosphere.path.profile import HUMIDITY, MOST_READINGS, PRESSURE, T
 from catseye.atmosphere.path.suspect_readings import suspect_readings
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError
+from catseye.names import AIR_MODEL
 from catseye.records.night.weather import Weather
 from catseye.records.site.site import SiteRecord
 
@@ -79,7 +80,7 @@ def site_air(
     ground: float | None = None,
     without: Sequence[str] = (),
     block: float | None = None,
-    model: str = "ciddor_hill1999",
+    model: str = AIR_MODEL,
     co2_ppm: float = 450.0,
     priors: WeatherPriors | None = None,
 ) -> SiteAir:

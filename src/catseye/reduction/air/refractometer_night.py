@@ -19,6 +19,7 @@ from pydantic import Field, ValidationError
 from catseye.atmosphere.index.air import MODELS, air
 from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
+from catseye.names import AIR_MODEL
 from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Certificate, Version, Within
@@ -62,7 +63,7 @@ class PathSheet(Certificate):
     u_path_length_mm: Annotated[float, Within(0, 1000)] = 25.0
     modulation_hz: Annotated[float, Within(1e7, 1e11)] = 1500e6
     wavelength_um: Annotated[float, Within(0.3, 1.7)] = 0.780
-    air_model: str = "ciddor_hill1999"
+    air_model: str = AIR_MODEL
     co2_ppm: Annotated[float, Within(0, 2000)] = 450.0
     u_temperature_c: Spread | Annotated[tuple[Spread, ...], Field(strict=False, min_length=1)] = 0.3
     u_pressure_hpa: Spread = 0.3

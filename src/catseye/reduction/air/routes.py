@@ -18,6 +18,7 @@ from catseye.atmosphere.limit import ValidInterval
 from catseye.atmosphere.weather import barometer, humidity
 from catseye.atmosphere.weather.condensation import Condensation, CondensationSpread, condensation
 from catseye.errors import ArgumentError
+from catseye.names import AIR_MODEL
 
 Hygrometer = Literal[
     "humidity_percent", "dew_point_c", "frost_point_c", "wet_bulb_c", "ice_bulb_c", "vapour_pressure_hpa"
@@ -165,7 +166,7 @@ class IndexFormula:
     """
 
     wavelength_um: float = 0.780
-    model: str = "ciddor_hill1999"
+    model: str = AIR_MODEL
     co2_ppm: float = 450.0
     modulation_hz: float = 1500e6
 

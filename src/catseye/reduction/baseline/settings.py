@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from catseye.atmosphere.sound.velocity import REFRACTION
+from catseye.names import AIR_MODEL
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class BaselineSettings:
     reference_height      m; None: the first pillar's, or the known baseline's
     """
 
-    air_model: str = "ciddor_hill1999"
+    air_model: str = AIR_MODEL
     wavelength_um: float = 0.658
     co2_ppm: float = 420.0
     reference_index: float = 1.000286338

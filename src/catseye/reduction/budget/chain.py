@@ -4,6 +4,8 @@ From phasors to metres, not linearised. It shares with the budget the list of in
 the electronics is drawn through all reference shots and the target's, and the interpolation is applied to it.
 """
 
+from typing import assert_never
+
 import numpy as np
 
 from catseye.atmosphere.index.air import MODELS, air, group_refractivity
@@ -13,6 +15,7 @@ from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.estimation.quality.propagation import Draw, Model, draw_inputs
 from catseye.geometry.mirror.encoder import azimuth_angle, elevation_angle
 from catseye.geometry.mirror.mirror_path import beam_angles, direction_angles, path_change
+from catseye.optics.retroreflector.kinds.kind import GlassForm
 from catseye.optics.retroreflector.prism import range_constant
 from catseye.reduction.budget.inputs import Item, correlation_of, felt
 from catseye.reduction.budget.scene import ShotScene, walk_of
@@ -159,13 +162,24 @@ def _glass(scene: ShotScene, v: DrawnInputs) -> np.ndarray:
     place = scene.place
     n0 = scene.campaign.site.ranging.bk7_to_air_group_index_ratio
     n = v("ratio", n0)
-    if place.kind == "ball":
-        r1, r2 = v("r1") * MILLIMETRE, v("r2") * MILLIMETRE
-        best = -(n0 * (v.best["r1"] + v.best["r2"]) - v.best["r1"]) * MILLIMETRE
-        return r1 - n * (r1 + r2) + (place.constant - best)
-    if place.normal is None:
-        return np.full(len(v.x), place.constant)
-    towards = scene.towards
+    match place.glass:
+        case GlassForm.NONE:
+            return np.full(len(v.x), place.constant)
+        case GlassForm.SPHERES:
+            r1, r2 = v("r1") * MILLIMETRE, v("r2") * MILLIMETRE
+            best = -(n0 * (v.best["r1"] + v.best["r2"]) - v.best["r1"]) * MILLIMETRE
+            return r1 - n * (r1 + r2) + (place.constant - best)
+        case GlassForm.SLAB:
+            return _slab(scene, v, n)
+        case _:
+            assert_never(place.glass)
+
+
+def _slab(scene: ShotScene, v: DrawnInputs, n: np.ndarray) -> np.ndarray:
+    """Correction for a prism's glass (n,), m, at group indices (n,)."""
+    place, towards = scene.place, scene.towards
+    n0 = scene.campaign.site.ranging.bk7_to_air_group_index_ratio
+    assert place.normal is not None
     along = towards - (towards @ place.normal) * place.normal
     size = float(np.linalg.norm(along))
     first = along / size if size > 1e-12 else np.linalg.svd(place.normal[None])[2][1]

@@ -16,6 +16,7 @@ the references with weights w_j, G = -n_g h cos r + h_rp cos I the glass of a pr
 """
 
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from catseye.atmosphere.path.mean import mean_over_height, pressure_at
 from catseye.atmosphere.weather.humidity import saturation, vapour_pressure_hpa
 from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.quality.propagation import STUDENT, Input
+from catseye.optics.retroreflector.kinds.kind import GlassForm
 from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.budget.scene import FELT, ShotScene, head_columns
 from catseye.reduction.epoch.head import AXES, head_corrections, head_unknowns
@@ -354,15 +356,25 @@ def _glass(scene: ShotScene) -> list[Item]:
     u_n = scene.assumptions.half_width_index_ratio / np.sqrt(3.0)
     ratio = Input("index of the glass over air", n, u_n, "rectangular")
     melt = ASSUMED + "no sheet names its melt"
-    if place.kind == "ball":
-        file, r1, r2, u = ball_of(scene)
-        return [
-            Item("r1", Input("radius of the small ball", r1, u), "mm", -(n - 1.0) * MILLIMETRE, f"{file}u_r_mm"),
-            Item("r2", Input("radius of the large ball", r2, u), "mm", -n * MILLIMETRE, f"{file}u_r_mm"),
-            Item("ratio", ratio, "", -(r1 + r2) * MILLIMETRE, melt),
-        ]
-    if place.normal is None:
-        return []
+    match place.glass:
+        case GlassForm.NONE:
+            return []
+        case GlassForm.SPHERES:
+            file, r1, r2, u = ball_of(scene)
+            return [
+                Item("r1", Input("radius of the small ball", r1, u), "mm", -(n - 1.0) * MILLIMETRE, f"{file}u_r_mm"),
+                Item("r2", Input("radius of the large ball", r2, u), "mm", -n * MILLIMETRE, f"{file}u_r_mm"),
+                Item("ratio", ratio, "", -(r1 + r2) * MILLIMETRE, melt),
+            ]
+        case GlassForm.SLAB:
+            return _slab(scene, ratio, melt)
+        case _:
+            assert_never(place.glass)
+
+
+def _slab(scene: ShotScene, ratio: Input, melt: str) -> list[Item]:
+    """Inputs of a prism's glass."""
+    place, campaign, n = scene.place, scene.campaign, ratio.value
     height = place.height
     bends = campaign.site.ranging.bk7_to_air_phase_index_ratio
     square = float(np.sin(scene.incidence) ** 2)

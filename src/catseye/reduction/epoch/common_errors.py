@@ -181,7 +181,7 @@ def _of_glass(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Si
     if prior is None:
         return
     owners = [network.layout.parameters[c].of for c in np.ravel(prior.columns).tolist()]
-    prisms = [name for name in owners if places[name].kind == "prism"]
+    prisms = [name for name in owners if places[name].normal is not None]
     for first in range(0, len(prisms), BATCH):
         batch = np.isin(owners, prisms[first : first + BATCH])
         error = np.where(batch, np.sqrt(variances(prior)), 0.0)

@@ -21,7 +21,7 @@ def dish_prisms(campaign: ObservedSite) -> list[str]:
 
     Source: README of the campaign layout: their reference points lie on the paraboloid when the surface is ideal.
     """
-    return sorted(n for n, t in campaign.targets.items() if t.type == "prism" and t.frame == "reflector")
+    return sorted(n for n, t in campaign.targets.items() if t.shapes_dish)
 
 
 def dish_prior(network: CampaignNetwork, x: np.ndarray, covariance: Covariance) -> list[Linear]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from catseye.constants import DEGREE
+from catseye.names import NOTES_AIR_MODEL
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class ReductionSettings:
                             fewer; the weakest modes beyond count as the shots' own errors
     """
 
-    air_model: str = "rueger1990"
+    air_model: str = NOTES_AIR_MODEL
     critical: float = 3.5
     smallest_return: float = 5.0
     u_thermometer_c: float = 0.3

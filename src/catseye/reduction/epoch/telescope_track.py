@@ -64,6 +64,6 @@ def moved_ends(
     names = campaign.shots.ranger[row], campaign.shots.target[row]
     turn, shift = motion.carried(names, buffer_middles(campaign, np.array([row, row])))
     a, b = (turn[k] @ end + shift[k] for k, end in enumerate(ends))
-    if place.normal is not None:
-        place = replace(place, normal=turn[1] @ place.normal)
+    if place.axis is not None:
+        place = replace(place, axis=turn[1] @ place.axis)
     return (a, b), place

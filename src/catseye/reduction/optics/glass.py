@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from catseye.atmosphere.index.air import air
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ArgumentError, ValidityError
+from catseye.names import NOTES_AIR_MODEL
 from catseye.optics.glass import (
     GLASSES,
     Glass,
@@ -170,7 +171,7 @@ def _surrounding_air(wavelength_um: float) -> tuple[str, float, float]:
     The makers' reference air is taken where the notes' model is not valid.
     """
     try:
-        about = air(*AIR, wavelength_um=wavelength_um, model="rueger1990")
+        about = air(*AIR, wavelength_um=wavelength_um, model=NOTES_AIR_MODEL)
     except ValidityError:
         phase, group = reference_air(wavelength_um, AIR[0])
         return "20 °C, 1013.25 hPa, dry", float(phase), float(group)

@@ -1,4 +1,4 @@
-"""Fit and comparison of the eight-term pointing series.
+"""Fit of the eight-term pointing series, and its verdict.
 
 Fitted to star offsets or to metrology. IE, HZCZ and HZSZ are nearly the same: 1, sin E and cos E over the
 elevations of a night differ little. The fit does not fail there but reports it: their covariance is large, the weak
@@ -11,14 +11,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from catseye.constants import ARCSECOND, DEGREE
+from catseye.constants import ARCSECOND, DEGREE, SPEED_OF_LIGHT
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.singular import LinearEstimate, best_linear_estimate
 from catseye.geometry.antenna.pointing_series import TERMS, PointingSeries, columns, design
+from catseye.reduction.pose.star_readings import BetterReading, better_readings
 from catseye.verdict import Verdict
 
 LIMIT = 4.0  # |w| of a star's coordinate beyond which `reject` leaves the star out
 PART = 0.2  # of the largest part of a combination: smaller parts are not named
+UNLIKELY = 1e-4  # chance, on either side, below which a stated uncertainty does not fit the scatter
+LOWEST_FREQUENCY = 1.15e9  # Hz, lowest of the Gregorian receivers: their widest beam
+APERTURE = 100.0  # m across: [GBTPM01]'s telescope
+TENTH = 0.1  # of the beam's width: a pointing error of it costs 3 % of the gain, exp(-4 ln 2 / 100)
+SECTOR = 24.0 * DEGREE  # a turn written in hours; in radians it is 6.3. In less azimuth the axis's lean is undetermined
+LOWEST = 6.0 * DEGREE  # a right angle written in hours; in radians it is 1.6. No telescope sees stars below it only
 FAMILIES = (("IA", "CA", "NPAE"), ("IE", "HZCZ", "HZSZ"))  # 1, sin E, cos E in azimuth, and in elevation
 
 
@@ -90,6 +97,14 @@ class PointingFit:
         """Correlation (k, k) of the coefficients."""
         u = np.sqrt(np.diag(self.series.covariance))
         return np.asarray(self.series.covariance / np.outer(u, u))
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the series, no better than its sources'.
+
+        Separation of terms, scatter against claimed or plausible values, columns that fit better in another reading.
+        """
+        return _verdict(self).resting_on(self.sources)
 
 
 def fit_pointing(
@@ -199,59 +214,71 @@ def _weak(terms: tuple[str, ...], covariance: np.ndarray, unit: np.ndarray) -> t
     return tuple(directions)
 
 
-@dataclass(frozen=True, eq=False)
-class SeriesComparison:
-    """Difference of two series of one telescope, second minus first.
+def largest_sky_rms() -> float:
+    """Largest residual of a usable series, rad: a tenth of the widest beam.
 
-    terms             common to both
-    difference        (k,) rad
-    covariance        (k, k) rad^2, the two independent
-    chi2, p           that the terms agree; nan where a covariance is missing
-    azimuth, elevation  (m,) rad, a grid over the sky
-    on_the_sky        (m, 2) rad, difference of the corrections there, all terms of both
-    u_on_the_sky      (m, 2) rad
+    The beam of an aperture D at the wavelength l is 1.2 l / D wide at half power. The published series leaves 7.39
+    arc seconds.
+
+    Source: [GBTPM01] for the telescope and its fit.
+
+    >>> round(largest_sky_rms() / ARCSECOND, 1)
+    64.5
     """
-
-    terms: tuple[str, ...]
-    difference: np.ndarray
-    covariance: np.ndarray
-    chi2: float
-    p: float
-    azimuth: np.ndarray
-    elevation: np.ndarray
-    on_the_sky: np.ndarray
-    u_on_the_sky: np.ndarray
-
-    @property
-    def rms_on_the_sky(self) -> float:
-        """Root mean square over the grid, rad."""
-        return float(np.sqrt(np.mean(np.sum(self.on_the_sky**2, axis=1))))
+    return TENTH * 1.2 * SPEED_OF_LIGHT / LOWEST_FREQUENCY / APERTURE
 
 
-def compare_series(first: PointingSeries, second: PointingSeries) -> SeriesComparison:
-    """Compare two series, term by term and on the sky.
+def _verdict(fit: PointingFit) -> Verdict:
+    if fit.degrees_of_freedom < 1:
+        return Verdict("doubtful", "as many observations as terms: nothing checks the series")
+    rms = fit.sky_rms / ARCSECOND
+    if fit.stars and (alternatives := _readings(fit)):
+        named = ", or as well if ".join(reading.text for reading in alternatives)
+        return Verdict("doubtful", f"{rms:.2f} arc seconds rms on the sky; it fits better if {named}")
+    if fit.stars and (doubt := _implausible_sky(fit)):
+        return Verdict("doubtful", doubt)
+    if fit.sky_rms > largest_sky_rms():
+        limit = largest_sky_rms() / ARCSECOND
+        return Verdict(
+            "doubtful",
+            f"{rms:.2f} arc seconds rms on the sky, beyond {limit:.0f}, a tenth of the beam at the telescope's lowest "
+            "frequency: check columns and units",
+        )
+    if not fit.scaled and (doubt := _contradicted(fit)):
+        return Verdict("doubtful", doubt)
+    undetermined = [w for w in fit.weak if w.u_on_the_sky > fit.sky_rms]
+    if undetermined:
+        return Verdict("doubtful", f"the observations do not separate {', '.join(undetermined[0].parts)}")
+    return Verdict(
+        "good", f"{int(fit.used.sum())} observations determine the terms, {rms:.2f} arc seconds rms on the sky"
+    )
 
-    On the sky between 10 and 80 degrees of elevation.
 
-    The terms agree with chi2 = d' (C1 + C2)^-1 d: nearly degenerate terms may differ much and mean the same, which both
-    this and the difference on the sky include. Raises EstimationError where no term is common.
-    """
+def _readings(fit: PointingFit) -> tuple[BetterReading, ...]:
+    """Better readings of the used stars' columns."""
+    used = fit.used
+    return better_readings(fit.azimuth[used], fit.elevation[used], fit.observed[used], terms=fit.series.terms)
+
+
+def _implausible_sky(fit: PointingFit) -> str:
+    """Implausible star positions as a text; "" for a usual sky."""
+    a, e = fit.azimuth[fit.used], fit.elevation[fit.used]
+    if np.all(e < LOWEST):
+        return f"every elevation is below {LOWEST / DEGREE:.0f} degrees: radians or hours for degrees?"
+    if np.ptp(a) <= SECTOR and np.ptp(e) > np.ptp(a):
+        return f"all azimuths lie within {np.ptp(a) / DEGREE:.1f} degrees, elevations do not: radians or hours?"
+    if np.all(a <= 0.0) and np.ptp(a) > np.pi:
+        return "all azimuths are below zero, over more than half a turn: are they counted clockwise from north?"
+    return ""
+
+
+def _contradicted(fit: PointingFit) -> str:
+    """Contradiction of scatter and stated uncertainty; "" for none."""
     from scipy import special
 
-    terms = tuple(t for t in TERMS if t in first.terms and t in second.terms)
-    if not terms:
-        raise EstimationError(f"no term is common to {', '.join(first.terms)} and {', '.join(second.terms)}")
-    i, j = [first.terms.index(t) for t in terms], [second.terms.index(t) for t in terms]
-    difference = second.values[j] - first.values[i]
-    spread = first.covariance[np.ix_(i, i)] + second.covariance[np.ix_(j, j)]
-    chi2 = p = float("nan")
-    scale = np.sqrt(np.diag(spread))
-    if np.all(scale > 0.0):
-        unit = spread / np.outer(scale, scale)
-        chi2 = float(difference / scale @ np.linalg.solve(unit, difference / scale))
-        p = float(special.chdtrc(len(terms), chi2))
-    a, e = (v.ravel() for v in np.meshgrid(np.arange(0, 360, 15) * DEGREE, np.arange(10, 81, 5) * DEGREE))
-    covariances = first.covariance_of_correction(a, e) + second.covariance_of_correction(a, e)
-    u = np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0.0))
-    delta = second.correction(a, e) - first.correction(a, e)
-    return SeriesComparison(terms, difference, spread, chi2, p, a, e, delta, u)
+    degrees, factor = fit.degrees_of_freedom, fit.variance_factor
+    if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
+        return f"observations scatter more than claimed (variance factor {factor:.2f})"
+    if fit.stars and special.chdtr(degrees, fit.pvv) < UNLIKELY:
+        return f"observations scatter less than claimed (variance factor {factor:.2g}): is its unit arc seconds?"
+    return ""

@@ -194,9 +194,7 @@ def _posture_of(epoch: SolvedPoints, site: SiteFolder, carrier: str) -> SiteFold
     if carrier == "ground":
         return site
     if epoch.posture is None:
-        raise InputError(
-            f"{epoch.file}: its posture is unknown (expected pose.json beside coordinates.json, or --earlier-posture)"
-        )
+        raise InputError(f"{epoch.file}: its posture is unknown (expected pose.json beside it, or earlier_posture_deg)")
     return at_posture(site, *epoch.posture)
 
 
@@ -217,7 +215,7 @@ def _design(
     """
     settings = ReductionSettings()
     focal = site.site.paraboloid.focal_length_mm * MILLIMETRE
-    on_dish = {n for n, t in site.targets.items() if t.type == "prism" and t.frame == "reflector"}
+    on_dish = {n for n, t in site.targets.items() if t.shapes_dish}
     inside = nominal_frame(site)
     x, q = np.zeros((len(names), 3)), np.zeros((len(names), 3, 3))
     for k, name in enumerate(names):

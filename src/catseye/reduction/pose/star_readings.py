@@ -10,14 +10,13 @@ cos E because azimuth times cos E, not azimuth, scatters alike. A wrong reading 
 right one's likelihood with a chance of 1/k at most.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.antenna.pointing_series import columns, design
-from catseye.reduction.pose.pointing_fit import PointingFit
 
 DECISIVE = float(np.log(1e4))  # a wrong reading of a correct table passes it once in 10 000
 FARTHEST = 5.0 * DEGREE  # between sky and encoders: as `records.laboratory.star_offsets` reads a table
@@ -69,18 +68,21 @@ READINGS: dict[str, Reading] = {
 }
 
 
-def better_readings(fit: PointingFit) -> tuple[BetterReading, ...]:
+def better_readings(
+    azimuth: np.ndarray, elevation: np.ndarray, observed: np.ndarray, *, terms: Sequence[str]
+) -> tuple[BetterReading, ...]:
     """Interpretations that fit decisively better.
 
     The best and those that nearly equal it.
 
-    fit   of stars; those that it rejects stay rejected
+    azimuth, elevation   (n,) rad, of the stars that are used, on the sky
+    observed             (n, 2) rad, azimuth times cos E and elevation: encoders less sky
+    terms                of the series
     """
-    used = fit.used
-    a, e = fit.azimuth[used], fit.elevation[used]
-    across, up = fit.observed[used].T
+    a, e = azimuth, elevation
+    across, up = observed.T
     as_read: Angles = (a, e, a + across / np.cos(e), e + up)
-    chosen = columns(fit.series.terms)
+    chosen = columns(terms)
     as_typed, _ = _likelihood(as_read, chosen)
     result = []
     for text, reading in READINGS.items():

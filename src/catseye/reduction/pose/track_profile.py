@@ -18,15 +18,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from catseye.constants import ARCSECOND
-from catseye.errors import EstimationError, FrameError
+from catseye.errors import EstimationError, FrameError, InputError
 from catseye.estimation.least_squares.singular import best_linear_estimate
 from catseye.geometry.antenna.pointing_series import axis_terms
 from catseye.geometry.frames.rotation import from_vector, rz
 from catseye.records.laboratory.tilts import TiltReadings
+from catseye.records.network.written_pose import WrittenPose
 from catseye.reduction.pose.pose import GroupPose
 from catseye.verdict import Verdict
 
 MOST_HARMONICS = 36
+EXCESS = 3.0  # standard deviations of the variance factor beyond which readings scatter more than claimed
 WAVE_1 = slice(2, 6)  # of the coefficients: cos 1A and sin 1A, about east and north
 
 
@@ -95,6 +97,22 @@ class TrackProfile:
     degrees_of_freedom: int
     p: float
     sources: Mapping[str, Verdict | None] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict from the scatter against the claim, undetermined parts, and the poses' verdicts."""
+        return self._own_verdict().resting_on(self.sources)
+
+    def _own_verdict(self) -> Verdict:
+        degrees = self.degrees_of_freedom
+        if degrees < 1:
+            return Verdict("doubtful", "as many readings as coefficients: the profile is unchecked")
+        factor, without = self.pvv / degrees, ""
+        if self.series.undetermined:
+            without = "; without the wave of one turn, which an inclinometer alone cannot separate from its zero"
+        if factor > 1.0 + EXCESS * (2.0 / degrees) ** 0.5:
+            return Verdict("doubtful", f"readings scatter more than claimed (variance factor {factor:.2f}){without}")
+        return Verdict("good", f"readings scatter about the profile as claimed (variance factor {factor:.2f}){without}")
 
 
 def _rows(azimuth: np.ndarray, harmonics: int) -> np.ndarray:
@@ -188,6 +206,30 @@ def track_profile(
         degrees_of_freedom=free,
         p=float(special.chdtrc(free, solution.pvv)) if free else float("nan"),
     )
+
+
+def track_of_poses(
+    poses: Sequence[WrittenPose], *, tilts: TiltReadings | None = None, harmonics: int = 2
+) -> TrackProfile:
+    """Fit the alidade's tilt by azimuth from written poses and an inclinometer.
+
+    poses       of the alidade, in its own frame, at several azimuths; none: the inclinometer alone
+    tilts       its readings, or None
+    harmonics   waves a turn, 0 to 36
+
+    Raises InputError for a pose in another frame or without posture, EstimationError as `track_profile`.
+    """
+    m = len(poses)
+    azimuth, turn, covariance = np.zeros(m), np.zeros((m, 2)), np.zeros((m, 2, 2))
+    for k, pose in enumerate(poses):
+        if pose.frame != "alidade" or pose.posture is None:
+            raise InputError(f"{pose.file}: is in the frame {pose.frame!r} (expected 'alidade', with its posture)")
+        if pose.rotation is None or pose.covariance is None:
+            raise InputError(f"{pose.file}: rotation or covariance is missing (expected 3 and 6 x 6 numbers)")
+        azimuth[k], turn[k], covariance[k] = pose.posture[0], pose.rotation[:2], pose.covariance[3:5, 3:5]
+    names = [pose.file for pose in poses]
+    profile = track_profile(azimuth, turn, covariance, tilts=tilts, harmonics=harmonics, names=names, partial=True)
+    return replace(profile, sources={pose.file: pose.verdict for pose in poses})
 
 
 def joined_tilt(

@@ -62,6 +62,6 @@ def tracked_names(site: SiteFolder) -> tuple[str, ...]:
 
     The dish has too many prisms to track.
     """
-    single = [n for n, t in site.targets.items() if not (t.type == "prism" and t.frame == "reflector")]
+    single = [n for n, t in site.targets.items() if not t.shapes_dish]
     triplets = [name for triplet in site.triplets.values() for name in triplet.targets]
     return tuple(sorted([*site.rangers, *single, *triplets]))

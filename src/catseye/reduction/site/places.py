@@ -13,7 +13,7 @@ from catseye.constants import MILLIMETRE
 from catseye.geometry.antenna.frames import ground_from_alidade, ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.geometry.mirror.mount import gamma, scan_point
-from catseye.optics.retroreflector import cats_eye, prism
+from catseye.optics.retroreflector.kinds.kind import GlassForm, RetroreflectorKind
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.target import TargetRow
 from catseye.records.site.triplet import TripletRecord
@@ -27,9 +27,9 @@ class RangedPoint:
     """Point of the network that can be ranged to.
 
     name       of the point
-    kind       "ranger", "prism", "ball" or "hollow"
+    kind       of retroreflector; None for a ranger
     start      (3,) m, ground frame
-    normal     (3,) of a prism's entry face, ground frame, or None
+    axis       (3,) outward, ground frame; None for a kind without one, and for a ranger
     height     m, of a prism
     constant   m, range constant Pc of its glass; 0 for hollow cubes
     u_constant m, its standard uncertainty from that of the glass's dimensions, shared by all shots on it
@@ -37,12 +37,14 @@ class RangedPoint:
     typed      True if its start is a typed approximate position
     u_start    m, each coordinate of the start, as its record says; None: `ReductionSettings.u_position` counts
     body       "dish", "arm" or "alidade"; "" on the ground
+
+    Raises InputError for a kind with an axis that lacks it.
     """
 
     name: str
-    kind: str
+    kind: RetroreflectorKind | None
     start: np.ndarray
-    normal: np.ndarray | None = None
+    axis: np.ndarray | None = None
     height: float = 0.0
     constant: float = 0.0
     u_constant: float = 0.0
@@ -50,6 +52,20 @@ class RangedPoint:
     typed: bool = True
     u_start: float | None = None
     body: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind is not None:
+            self.kind.axis_of(self.name, self.axis)
+
+    @property
+    def glass(self) -> GlassForm:
+        """Form of its glass; none for a ranger."""
+        return GlassForm.NONE if self.kind is None else self.kind.glass
+
+    @property
+    def normal(self) -> np.ndarray | None:
+        """Normal (3,) of an entry face under which the range depends on the incidence; None without one."""
+        return self.axis if self.kind is not None and self.kind.is_oblique else None
 
     @cached_property
     def across(self) -> np.ndarray:
@@ -85,8 +101,8 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
     At their approximate positions in the ground frame.
 
     Source: README of the campaign layout; [PARKER04] eqs. 2.3-2.7 for scan points, 2.44 for the reflector frame;
-    [GOLDMAN00] figure 10 for the triplet: ball = mid-point + h_corr * normal, normal towards the prism side. The
-    constants' uncertainties are the derivatives of 3.8 (n u_height at a fixed reference point) and 3.14.
+    [GOLDMAN00] figure 10 for the triplet: ball = mid-point + h_corr * normal, normal towards the prism side; the ball
+    faces the other way.
     """
     n = campaign.site.ranging.bk7_to_air_group_index_ratio
     to_ground = {
@@ -99,7 +115,7 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
         mirror = campaign.mirror_of(name)
         places[name] = RangedPoint(
             name,
-            "ranger",
+            None,
             scan_point(
                 np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE,
                 gamma(monument.alpha1_rad, monument.alpha2_rad, monument.alpha3_rad),
@@ -109,7 +125,7 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
         )
     for ranger in campaign.feedarm.ranger:
         where = to_ground["reflector"].points(np.array(ranger.nominal_scan_point_mm) * MILLIMETRE)
-        places[ranger.name] = RangedPoint(ranger.name, "ranger", where, u_start=_metres(ranger.u_position_mm))
+        places[ranger.name] = RangedPoint(ranger.name, None, where, u_start=_metres(ranger.u_position_mm))
     for target in campaign.targets.values():
         places[target.name] = _target(target, to_ground[target.frame], n)
     for triplet in campaign.triplets.values():
@@ -121,24 +137,22 @@ def places_of(campaign: SiteFolder) -> dict[str, RangedPoint]:
 
 
 def _target(target: TargetRow, frame: Transform, n: float) -> RangedPoint:
-    """A single prism or hollow cube.
+    """A single target.
 
     n is the glass's group index over the air's.
     """
     where = frame.points(np.array(target.position_mm) * MILLIMETRE)
-    if target.type == "prism" and target.normal is not None and target.height_mm and target.pc_mm is not None:
-        return RangedPoint(
-            target.name,
-            "prism",
-            where,
-            unit(frame.directions(target.normal)),
-            target.height_mm * MILLIMETRE,
-            target.pc_mm * MILLIMETRE,
-            n * (target.u_height_mm or 0.0) * MILLIMETRE,
-            target.name,
-            u_start=_metres(target.u_position_mm),
-        )
-    return RangedPoint(target.name, "hollow", where, u_start=_metres(target.u_position_mm))
+    return RangedPoint(
+        name=target.name,
+        kind=target.kind,
+        start=where,
+        axis=None if target.normal is None else unit(frame.directions(target.normal)),
+        height=(target.height_mm or 0.0) * MILLIMETRE,
+        constant=(target.pc_mm or 0.0) * MILLIMETRE,
+        u_constant=target.kind.u_range_constant(n, target.u_height_mm or 0.0) * MILLIMETRE,
+        group=target.name if target.kind.is_oblique else "",
+        u_start=_metres(target.u_position_mm),
+    )
 
 
 def _triplet(triplet: TripletRecord, frame: Transform, n: float) -> Iterator[RangedPoint]:
@@ -152,22 +166,23 @@ def _triplet(triplet: TripletRecord, frame: Transform, n: float) -> Iterator[Ran
     half = 0.5 * triplet.d12_mm * MILLIMETRE * axis
     for side, where in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
         yield RangedPoint(
-            side.target,
-            "prism",
-            where,
-            normal,
-            side.height_mm * MILLIMETRE,
-            side.pc_mm * MILLIMETRE,
-            n * side.u_height_mm * MILLIMETRE,
-            triplet.triplet,
+            name=side.target,
+            kind=side.kind,
+            start=where,
+            axis=normal,
+            height=side.height_mm * MILLIMETRE,
+            constant=side.pc_mm * MILLIMETRE,
+            u_constant=side.kind.u_range_constant(n, side.u_height_mm) * MILLIMETRE,
+            group=triplet.triplet,
             u_start=_metres(triplet.u_position_mm),
         )
     yield RangedPoint(
-        triplet.ball.target,
-        "ball",
-        ball,
+        name=triplet.ball.target,
+        kind=triplet.ball.kind,
+        start=ball,
+        axis=-normal,
         constant=triplet.ball.pc_b_mm * MILLIMETRE,
-        u_constant=float(np.hypot(n - 1.0, n)) * triplet.ball.u_r_mm * MILLIMETRE,
+        u_constant=triplet.ball.kind.u_range_constant(n, triplet.ball.u_r_mm) * MILLIMETRE,
         u_start=_metres(triplet.u_position_mm),
     )
 
@@ -177,7 +192,7 @@ def _metres(value_mm: float | None) -> float | None:
 
 
 def sheet_notes(campaign: SiteFolder) -> list[str]:
-    """Glass constants that contradict their dimensions, one line each.
+    """GlassForm constants that contradict their dimensions, one line each.
 
     Every shot on a target shares its constant, so that no residual shows a typing error in it.
 
@@ -187,14 +202,13 @@ def sheet_notes(campaign: SiteFolder) -> list[str]:
     glasses: list[tuple[str, str, float, float]] = []
     for target in campaign.targets.values():
         if target.height_mm is not None and target.pc_mm is not None:
-            glasses.append((target.name, "pc_mm", target.pc_mm, float(prism.range_constant(target.height_mm, n))))
+            glasses.append((target.name, "pc_mm", target.pc_mm, target.kind.range_constant(n, target.height_mm)))
     for triplet in campaign.triplets.values():
         ball = triplet.ball
-        glasses.append(
-            (ball.target, "pc_b_mm", ball.pc_b_mm, float(cats_eye.range_constant(ball.r1_mm, ball.r2_mm, n)))
-        )
+        by_radii = ball.kind.range_constant(n, ball.r1_mm, ball.r2_mm)
+        glasses.append((ball.target, "pc_b_mm", ball.pc_b_mm, by_radii))
         for side in (triplet.left_prism, triplet.right_prism):
-            glasses.append((side.target, "pc_mm", side.pc_mm, float(prism.range_constant(side.height_mm, n))))
+            glasses.append((side.target, "pc_mm", side.pc_mm, side.kind.range_constant(n, side.height_mm)))
     return [
         f"{name}: {key} = {typed} does not follow from its dimensions, which give {right:.4f}: one of them is mistyped"
         for name, key, typed, right in glasses

@@ -13,6 +13,7 @@ from catseye.geometry.mirror.imperfect import imperfect_ray
 from catseye.geometry.mirror.pointing import MirrorStation, ray
 from catseye.geometry.mirror.slew import Pace
 from catseye.geometry.sky.sun import altitude_azimuth
+from catseye.optics.retroreflector.kinds.registry import kind_named
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
@@ -59,11 +60,11 @@ def place_of_monument(
     for key, limits in (("latitude_deg", (-90.0, 90.0)), ("longitude_deg", (-180.0, 360.0))):
         value = angles[key]
         if value is not None and not limits[0] <= value <= limits[1]:
-            raise InputError(f"--{key.replace('_', '-')} {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
+            raise InputError(f"{key} = {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
         if value is None:
             raise InputError(
                 f"the Sun's place needs {key}, which the record of {monument.monument} lacks (expected it "
-                f"there, or --{key.replace('_', '-')})"
+                f"there, or as an argument)"
             )
     height = monument.elevation_m or 0.0
     latitude, longitude = float(angles["latitude_deg"]) * DEGREE, float(angles["longitude_deg"]) * DEGREE
@@ -129,23 +130,23 @@ def seen_from(
 
     Points in the ground frame.
 
-    kind      of retroreflector, a key of ACCEPTANCE
+    kind      name of the retroreflectors' kind
     facing    (3,) of all of them, ground: outward normal; None: incidence is not judged
     solids    possible obstructions
     posture   azimuth, elevation, rad, of the telescope if it carries some of them
     reachable (n,) bool: within the azimuth stops in one of the pointings
 
-    Raises InputError for a solid on the telescope without a posture.
+    Raises InputError for an unknown kind, and for a solid on the telescope without a posture.
     """
     aboard = next((solid for solid in solids.all if solid.frame != "ground"), None)
     if posture is None and aboard is not None:
         raise InputError(
-            f"solid {aboard.name!r} stands in the frame {aboard.frame}: its position is unknown (expected --posture)"
+            f"solid {aboard.name!r} stands in the frame {aboard.frame}: its position is unknown (expected posture_deg)"
         )
     axis = np.full(3, np.nan) if facing is None else facing
     return visibility(
         {name: station.scan_point},
-        Retroreflectors(("",) * len(to), (kind,) * len(to), to, np.broadcast_to(axis, to.shape)),
+        Retroreflectors(("",) * len(to), (kind_named(kind),) * len(to), to, np.broadcast_to(axis, to.shape)),
         solids,
         frames=frames_at(*(posture or (0.0, 0.0))),
         reachable=None if reachable is None else reachable[None],

@@ -66,10 +66,10 @@ class SearchHead:
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """Fitted spot; NaN where the status is not "found".
+    """Fitted spot; NaN where none was found.
 
-    status            "found", or one line: the searched area and what to do
-    counts            (2,) of its centre, real
+    status            text: "found", or the searched area and what to do
+    counts            (2,) of its centre, real; finite for a spot that was found
     covariance        (2, 2) counts^2
     amplitude         V of the centre, above the background
     radius            rad, at 1/e^2
@@ -95,7 +95,8 @@ class Spot:
 
     @property
     def found(self) -> bool:
-        return self.status == FOUND
+        """True for a spot with a centre."""
+        return bool(np.isfinite(self.counts).all())
 
     @property
     def u_counts(self) -> Array:

@@ -1,13 +1,13 @@
 """Visibility of retroreflectors from rangers in a posture, with reasons.
 
-The acceptance of each kind of retroreflector is in one table, `ACCEPTANCE`. A cube corner is used as long as
+Each kind of retroreflector has its acceptance (`optics.retroreflector.kinds`). A cube corner is used as long as
 `least_share` of its face returns light (`optics.retroreflector.prism.clear_share`); the light that the polished faces
 of an uncoated prism transmit beyond 20 deg on the side of an edge (`optics.retroreflector.solid_prism`) is not counted
 there.
 
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from catseye.aliases import Array
-from catseye.constants import DEGREE
 from catseye.geometry.antenna.frames import (
     ELEVATION_AXIS_HEIGHT,
     alidade_from_elevation,
@@ -24,7 +23,7 @@ from catseye.geometry.antenna.frames import (
 )
 from catseye.geometry.clearance.visibility import first_obstruction, incidence, ranges
 from catseye.geometry.frames.frame import Transform
-from catseye.optics.retroreflector.prism import clear_share
+from catseye.optics.retroreflector.kinds.kind import RetroreflectorKind
 from catseye.records.night.campaign import Campaign
 from catseye.records.site.solids import Solids
 from catseye.reduction.site.places import places_of
@@ -32,44 +31,6 @@ from catseye.reduction.site.places import places_of
 CLEAR_START = 0.6  # m: the ranger's own head and mount
 CLEAR_END = 0.15  # m: the retroreflector's own seat, and a cat's-eye's other half
 BEAM_RADIUS = 0.0125  # m: the GBT's beam at 120 to 230 m, 1/e^2, and a little
-
-
-@dataclass(frozen=True)
-class Acceptance:
-    """Largest incidence of a kind of retroreflector.
-
-    why            source of the numbers
-    cone           rad: explicit; None where it follows from the face
-    aperture       m, radius of a cube corner's face; height m; index, phase, of its material
-    least_share    of its face that must return light
-    """
-
-    why: str
-    cone: float | None = None
-    aperture: float = 25.4e-3
-    height: float = 38.1e-3
-    index: float = 1.0
-    least_share: float = 0.075
-
-    @property
-    def limit(self) -> float:
-        """Largest usable incidence, rad."""
-        if self.cone is not None:
-            return self.cone
-        from scipy.optimize import brentq
-
-        def spare(angle: float) -> float:
-            face = {"aperture": self.aperture, "height": self.height, "index": self.index}
-            return float(clear_share(angle, **face)) - self.least_share
-
-        return float(brentq(spare, 0.0, 0.499 * np.pi))
-
-
-ACCEPTANCE: Mapping[str, Acceptance] = {
-    "prism": Acceptance("face of 2 inches, 1.5 inches high, BK 7, as GBT's; least share chosen: 45 deg", index=1.511),
-    "hollow": Acceptance("round face inscribed in the corner: sqrt 2 of its radius high; same share", height=35.9e-3),
-    "ball": Acceptance("beyond, the half-balls' common plane is in the way; chosen, not measured", cone=80.0 * DEGREE),
-}
 
 
 class Sight(IntEnum):
@@ -96,15 +57,30 @@ class Retroreflectors:
     """Retroreflectors in the ground frame.
 
     names    (t)
-    kinds    (t) keys of ACCEPTANCE
+    kinds    (t)
     points   (t, 3) m
-    axes     (t, 3) outward axes; NaN without a record: then incidence is not judged
+    axes     (t, 3) outward axes; NaN without one: then incidence is not judged
     """
 
     names: tuple[str, ...]
-    kinds: tuple[str, ...]
+    kinds: tuple[RetroreflectorKind, ...]
     points: Array
     axes: Array
+
+    @classmethod
+    def with_axes(
+        cls,
+        names: tuple[str, ...],
+        kinds: tuple[RetroreflectorKind, ...],
+        points: Array,
+        axes: Sequence[Array | None],
+    ) -> "Retroreflectors":
+        """Retroreflectors of a site, each with its axis (3,), or None for a kind without one.
+
+        Raises InputError for a kind with an axis that lacks it.
+        """
+        checked = [kind.axis_of(name, axis) for name, kind, axis in zip(names, kinds, axes, strict=True)]
+        return cls(names, kinds, points, np.array([np.full(3, np.nan) if axis is None else axis for axis in checked]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +138,6 @@ def visibility(
     frames: Mapping[str, Transform],
     limits: RangeLimits | None = None,
     reachable: NDArray[np.bool_] | None = None,
-    acceptance: Mapping[str, Acceptance] = ACCEPTANCE,
     beam_radius: float = BEAM_RADIUS,
 ) -> Visibility:
     """Visibility of every pair of ranger and retroreflector.
@@ -175,7 +150,6 @@ def visibility(
     frames        name: ground from that frame, for each frame of a solid, see `frames_at`
     limits        of ranges
     reachable     (r, t) bool: within the azimuth stops; None: unknown
-    acceptance    of each kind of retroreflector
     beam_radius   m, by which solids are grown
 
     Reasons are judged in the order range, incidence, obstruction, stops.
@@ -186,7 +160,8 @@ def visibility(
     stand = np.array(list(rangers.values()), dtype=float).reshape(-1, 3)
     distance = ranges(stand, targets.points)
     angle = incidence(stand, targets.points, targets.axes)
-    limit = np.array([acceptance[kind].limit for kind in targets.kinds])
+    limits_of = {kind.name: kind.acceptance.limit for kind in targets.kinds}
+    limit = np.array([limits_of[kind.name] for kind in targets.kinds])
     which, at, names = _obstructions(stand, targets.points, solids, frames, beam_radius)
     code = np.full(distance.shape, Sight.SEEN, dtype=np.int64)
     with np.errstate(invalid="ignore"):
@@ -221,27 +196,19 @@ def frames_at(azimuth: float, elevation: float, reflector: Transform | None = No
 
 
 def retroreflectors_of(campaign: Campaign) -> Retroreflectors:
-    """Prisms, hollow cubes and balls of a campaign, at nominal places.
+    """Retroreflectors of a campaign, at nominal places.
 
     In its posture.
 
-    A ball faces opposite to its triplet's normal, which points to the prisms' side. No record has the orientation of a
-    hollow cube: its incidence is not judged.
-
-    Source: `places_of`; [GOLDMAN00] figure 10.
+    Source: `places_of`.
     """
-    places = {name: place for name, place in places_of(campaign).items() if place.kind != "ranger"}
-    balls = {triplet.ball.target: places[triplet.left_prism.target].normal for triplet in campaign.triplets.values()}
-    axes = []
-    for name, place in places.items():
-        normal = place.normal if place.normal is not None else balls.get(name)
-        sign = -1.0 if name in balls else 1.0
-        axes.append(np.full(3, np.nan) if normal is None else sign * normal)
-    return Retroreflectors(
-        tuple(places),
-        tuple(place.kind for place in places.values()),
-        np.array([place.start for place in places.values()]),
-        np.array(axes),
+    table = [(place, place.kind) for place in places_of(campaign).values()]
+    targets = [(place, kind) for place, kind in table if kind is not None]
+    return Retroreflectors.with_axes(
+        tuple(place.name for place, _ in targets),
+        tuple(kind for _, kind in targets),
+        np.array([place.start for place, _ in targets]),
+        tuple(place.axis for place, _ in targets),
     )
 
 

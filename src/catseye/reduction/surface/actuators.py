@@ -79,7 +79,7 @@ def actuators_of(site: SiteFolder) -> tuple[tuple[str, ...], np.ndarray]:
 
     Raises InputError for a site without any.
     """
-    prisms = {n: t for n, t in sorted(site.targets.items()) if t.type == "prism" and t.frame == "reflector"}
+    prisms = {n: t for n, t in sorted(site.targets.items()) if t.shapes_dish}
     if not prisms:
         raise InputError(f"{site.directory}: targets.toml has no prism in the reflector frame, so no actuator")
     return tuple(prisms), np.array([t.position_mm for t in prisms.values()]) * MILLIMETRE

@@ -84,9 +84,7 @@ def design_places(site: SiteFolder) -> dict[str, np.ndarray]:
     In the dish's frame.
     """
     return {
-        name: np.array(target.position_mm) * MILLIMETRE
-        for name, target in site.targets.items()
-        if target.type == "prism" and target.frame == "reflector"
+        name: np.array(target.position_mm) * MILLIMETRE for name, target in site.targets.items() if target.shapes_dish
     }
 
 

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 from catseye.aliases import Array
 from catseye.atmosphere.index.air import air
 from catseye.errors import ValidityError
+from catseye.names import NOTES_AIR_MODEL
 
 TOLERANCE = 0.15e-3  # m: of the spacing, the ball's place, and of H_corr against the surface plate
 D_12 = 0.635  # m: the design's spacing
@@ -167,7 +168,7 @@ def refractivity_slopes(
     >>> [round(s * 1e6, 6) for s in refractivity_slopes()]
     [-0.895887, 0.272048, -0.009606]
     """
-    slope = air(temperature_c, pressure_hpa, humidity_percent, model="rueger1990").sensitivity
+    slope = air(temperature_c, pressure_hpa, humidity_percent, model=NOTES_AIR_MODEL).sensitivity
     return RefractivitySlopes(float(slope.temperature_c), float(slope.pressure_hpa), float(slope.humidity_percent))
 
 

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import assert_never
 
 import numpy as np
 
 from catseye.constants import PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.records.site.retroreflector import GlassForm
 from catseye.simulator.night.air import TrueAir
 from catseye.simulator.night.expansion import MovingPoints
 from catseye.simulator.night.faults import Faults, Planted, Streams
@@ -23,7 +25,13 @@ NEIGHBOUR_M = 5.0  # outer scale of stationary eddies: extent of air warmed by t
 DRIFT_RAD_PER_ROOT_HOUR = 0.010
 HARMONICS = np.array([0.0020, 0.0003])  # second and third, of the amplitude, their phases any from shot to shot
 REFERENCE_VOLT = 6.5
-USUAL_VOLT = {"dish": (3.8, 5.4), "prism": (4.2, 5.9), "arm": (4.5, 6.2), "ball": (2.1, 3.1), "hollow": (2.8, 3.8)}
+USUAL_VOLT = {  # by place; plate and underside are a triplet's
+    "dish": (3.8, 5.4),
+    "plate": (4.2, 5.9),
+    "underside": (2.1, 3.1),
+    "arm": (4.5, 6.2),
+    "single": (2.8, 3.8),
+}
 BENCHMARK_VOLT = (4.4, 5.4)
 
 
@@ -44,13 +52,17 @@ def glass_delay(target: TrueTarget, towards_ranger, *, obliquity: float):
 
     `obliquity` scales the effect of the angle.
     """
-    if target.kind == "ball":
-        return ball_delay(*target.sizes)
-    if target.normal is None:
-        return 0.0
-    straight = (GLASS_TO_AIR - 1.0 / GLASS_TO_AIR) * target.sizes[0]
-    slanted = float(prism_delay(np.asarray(target.sizes[0]), target.normal, towards_ranger))
-    return straight + obliquity * (slanted - straight)
+    match target.kind.glass:
+        case GlassForm.NONE:
+            return 0.0
+        case GlassForm.SPHERES:
+            return ball_delay(*target.sizes)
+        case GlassForm.SLAB:
+            straight = (GLASS_TO_AIR - 1.0 / GLASS_TO_AIR) * target.sizes[0]
+            slanted = float(prism_delay(np.asarray(target.sizes[0]), target.normal, towards_ranger))
+            return straight + obliquity * (slanted - straight)
+        case _:
+            assert_never(target.kind.glass)
 
 
 def electronic_phase(head: TrueHead, seconds, streams: Streams, *, planted: Planted):
@@ -72,10 +84,10 @@ def usual_volt(name: str, draw: float) -> float:
     if name.startswith("ZBM"):
         low, high = BENCHMARK_VOLT
     else:
-        kind = {"DP": "dish", "ZY": "arm"}.get(name[:2], "hollow")
+        place = {"DP": "dish", "ZY": "arm"}.get(name[:2], "single")
         if name.startswith("TR"):
-            kind = "ball" if name.endswith("-B") else "prism"
-        low, high = USUAL_VOLT[kind]
+            place = "underside" if name.endswith("-B") else "plate"
+        low, high = USUAL_VOLT[place]
     return low + (high - low) * draw
 
 

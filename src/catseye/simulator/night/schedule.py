@@ -107,7 +107,7 @@ def feed_arm_targets(
     The other rangers and the triplets' prisms once, nearly all dish prisms.
     """
     rangers = [r for r in FEED_ARM_RANGERS if r != ranger]
-    prisms = [t.name for unit_ in telescope.triplets for t in unit_.targets if t.kind == "prism"]
+    prisms = [t.name for unit_ in telescope.triplets for t in unit_.plate]
     share = rule.weak_share if ranger == faults.weak_ranger else 0.99
     drawn = streams(f"prisms/{ranger}").uniform(size=len(telescope.dish))
     dish = [t.name for t, u in zip(telescope.dish, drawn, strict=True) if u < share]

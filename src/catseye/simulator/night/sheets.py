@@ -10,6 +10,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE, SECONDS_PER_DAY
 from catseye.errors import InputError
+from catseye.records.site.retroreflector import GlassForm
 from catseye.simulator.night.air import ELEVATION_OF_Z0
 from catseye.simulator.night.glass import GLASS_TO_AIR
 from catseye.simulator.night.head import CYCLES, SAMPLES_PER_CYCLE
@@ -116,11 +117,12 @@ def head_sheet(h: TrueHead) -> str:
 
 
 def target_entry(t: TrueTarget) -> str:
-    entry = f'[[target]]\nname = "{t.name}"\ntype = "{t.kind}"\n'
-    entry += 'material = "BK7"\n' if t.kind == "prism" else ""
+    entry = f'[[target]]\nname = "{t.name}"\ntype = "{t.kind.name}"\n'
+    entry += 'material = "BK7"\n' if t.kind.glass is GlassForm.SLAB else ""
     entry += f'frame = "{t.frame}"\nposition_mm = {vector(t.position_mm, 1)}\n'
-    if t.kind == "prism":
+    if t.normal_typed is not None:
         entry += f"normal = {vector(t.normal_typed, 5)}     # outward normal of the entry face, same frame\n"
+    if t.kind.glass is GlassForm.SLAB:
         entry += prism_constants(t.sizes_mm[0])
     return entry
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import InputError, ValidityError
+from catseye.records.site.retroreflector import HOLLOW
 from catseye.simulator.night.air import NIGHT, AirConditions, TrueAir
 from catseye.simulator.night.batches import in_batches
 from catseye.simulator.night.expansion import MovingPoints, SteelExpansion
@@ -231,7 +232,7 @@ def benchmark_targets(marks: list[TrueBenchmark], streams: Streams, planted: Pla
     """Benchmarks as targets with approximate positions."""
     rng = streams("benchmark positions")
     typed = [typed_mm(b.true_point + typing_error(planted, rng)) for b in marks]
-    return [TrueTarget(b.name, "hollow", "ground", t, b.true_point) for b, t in zip(marks, typed, strict=True)]
+    return [TrueTarget(b.name, HOLLOW, "ground", t, b.true_point) for b, t in zip(marks, typed, strict=True)]
 
 
 def shifted(points: dict[str, np.ndarray], planted: Planted) -> dict[str, np.ndarray]:

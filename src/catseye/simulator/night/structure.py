@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.records.site.retroreflector import BALL, HOLLOW, PRISM, RetroreflectorKind
 from catseye.simulator.night.faults import Faults, Planted, Streams
 from catseye.simulator.night.posture import TruePosture
 from catseye.simulator.night.world import FEED_ARM_RANGERS
@@ -34,11 +35,11 @@ WEDGE_DEG = 10.0  # the dish prisms stand on wedges of multiples of this
 class TrueTarget:
     """Target with typed values and truth.
 
-    `normal` looks at the rangers (a ball: its axis).
+    `normal` is the axis, towards the rangers; None for a kind without one.
     """
 
     name: str
-    kind: str  # 'hollow', 'prism' or 'ball'
+    kind: RetroreflectorKind
     frame: str
     position_mm: np.ndarray  # as typed
     point: np.ndarray  # true, m, ground frame
@@ -46,6 +47,9 @@ class TrueTarget:
     normal: np.ndarray | None = None  # true, ground frame
     sizes_mm: tuple[float, ...] = ()  # typed: prism height, or ball radii
     sizes: tuple[float, ...] = ()  # true, m
+
+    def __post_init__(self) -> None:
+        self.kind.axis_of(self.name, self.normal)
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,11 @@ class TrueTriplet:
     l_mpbc_mm: float
     design: np.ndarray  # of the ball, m, reflector frame
     targets: tuple[TrueTarget, TrueTarget, TrueTarget]
+
+    @property
+    def plate(self) -> tuple[TrueTarget, TrueTarget]:
+        """Both prisms, left and right."""
+        return self.targets[0], self.targets[1]
 
 
 @dataclass(frozen=True)
@@ -152,7 +161,7 @@ def dish_prisms(count: int, pose: TruePosture, streams: Streams, *, planted: Pla
     return [
         TrueTarget(
             name=f"DP{i + 1:03d}",
-            kind="prism",
+            kind=PRISM,
             frame="reflector",
             position_mm=typed_mm(typed[i]),
             point=points[i],
@@ -197,7 +206,7 @@ def triplet(number: int, count: int, pose: TruePosture, *, streams: Streams, pla
     prisms = [
         TrueTarget(
             name=f"{name}-{side}",
-            kind="prism",
+            kind=PRISM,
             frame="reflector",
             position_mm=typed + sign * d12_mm / 2.0 * axis,
             point=pose.dish(middle + sign * d12 / 2.0 * true_axis),
@@ -210,7 +219,7 @@ def triplet(number: int, count: int, pose: TruePosture, *, streams: Streams, pla
     ]
     looker = TrueTarget(
         name=f"{name}-B",
-        kind="ball",
+        kind=BALL,
         frame="reflector",
         position_mm=typed,
         point=pose.dish(ball),
@@ -231,7 +240,7 @@ def structure(
     place = FEED_ARM_DESIGN + rng.normal(0.0, 0.01, FEED_ARM_DESIGN.shape)
     arm_typed = typed_mm(place + typing_error(planted, rng, place.shape))
     arm = {
-        name: TrueTarget(name, "hollow", "reflector", arm_typed[i], pose.arm(place[i]))
+        name: TrueTarget(name, HOLLOW, "reflector", arm_typed[i], pose.arm(place[i]))
         for i, name in enumerate(FEED_ARM_RANGERS)
     }
     aim_mm = typed_mm(AIM_POINT_DESIGN + typing_error(planted, rng))
@@ -250,12 +259,12 @@ def structural_targets(pose: TruePosture, streams: Streams, planted: Planted):
     for name, at in STRUCTURAL_REFLECTOR.items():
         design[name] = pose.nominal(np.array(at))
         typed = typed_mm(np.array(at) + typing_error(planted, rng))
-        targets.append(TrueTarget(name, "hollow", "reflector", typed, pose.arm(np.array(at))))
+        targets.append(TrueTarget(name, HOLLOW, "reflector", typed, pose.arm(np.array(at))))
     for name, at in STRUCTURAL_ALIDADE.items():
         design[name] = pose.alidade(np.array(at))
         point = design[name] + planted.gain("posture") * rng.normal(0.0, 2.0, 3) * MILLIMETRE
         typed = typed_mm(design[name] + typing_error(planted, rng))
-        targets.append(TrueTarget(name, "hollow", "ground", typed, point))
+        targets.append(TrueTarget(name, HOLLOW, "ground", typed, point))
     return targets, design
 
 

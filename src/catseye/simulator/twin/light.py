@@ -1,9 +1,12 @@
 """Return of a living ranger: optical path, amplitude, electronics phase."""
 
+from typing import assert_never
+
 import numpy as np
 
 from catseye.aliases import Array
 from catseye.constants import DEGREE, TWO_PI
+from catseye.records.site.retroreflector import GlassForm
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import DRIFT_RAD_PER_ROOT_HOUR
 from catseye.simulator.twin.targets import BodyRetroreflector
@@ -11,7 +14,7 @@ from catseye.simulator.twin.waves import Waves, correlated, joined, walk
 
 SPOT = 0.014  # m: amplitude exp(-d^2 / 2 SPOT^2) for a beam at d from the middle: 10 mm of beam and the receiver
 CUBE_RADIUS = 0.005  # m, acceptance of the internal cube: some hundred counts
-PRISM_END = 45.0 * DEGREE  # incidence at which a prism's aperture vanishes
+CORNER_END = 45.0 * DEGREE  # incidence at which a cube corner's aperture vanishes
 BALL_FULL, BALL_END = 60.0 * DEGREE, 79.0 * DEGREE  # off a ball's axis
 SCINTILLATION, FLICKER = 0.022, 0.3  # of amplitude, one sigma; s of correlation
 GUST, SPELL = 4.0, 1800.0  # s of correlation of a path's index: turbulence, and effects local to the path
@@ -44,13 +47,18 @@ def glass_way(retro: BodyRetroreflector, cosine: Array, *, group: float, phase: 
 
     obliquity   factor on the effect of the angle
     """
-    if retro.kind == "ball":
-        r1, r2 = retro.sizes
-        return np.full_like(cosine, group * (r1 + r2) - r1)
-    if retro.kind == "hollow" or not retro.sizes:
-        return np.zeros_like(cosine)
-    straight = (group - 1.0 / group) * retro.sizes[0]
-    return straight + obliquity * (prism_way(retro.sizes[0], cosine, group=group, phase=phase) - straight)
+    match retro.kind.glass:
+        case GlassForm.NONE:
+            return np.zeros_like(cosine)
+        case GlassForm.SPHERES:
+            r1, r2 = retro.sizes
+            return np.full_like(cosine, group * (r1 + r2) - r1)
+        case GlassForm.SLAB:
+            (height,) = retro.sizes
+            straight = (group - 1.0 / group) * height
+            return straight + obliquity * (prism_way(height, cosine, group=group, phase=phase) - straight)
+        case _:
+            assert_never(retro.kind.glass)
 
 
 def acceptance(retro: BodyRetroreflector, cosine: Array) -> Array:
@@ -58,10 +66,10 @@ def acceptance(retro: BodyRetroreflector, cosine: Array) -> Array:
     if retro.facing is None:
         return np.ones_like(cosine)
     angle = np.arccos(np.clip(cosine, -1.0, 1.0))
-    if retro.kind == "ball":
+    if retro.kind.glass is GlassForm.SPHERES:
         past = np.clip((angle - BALL_FULL) / (BALL_END - BALL_FULL), 0.0, 1.0)
         return 1.0 - past**2 * (3.0 - 2.0 * past)
-    return np.where(angle < PRISM_END, np.cos(2.0 * np.minimum(angle, PRISM_END)), 0.0)
+    return np.where(angle < CORNER_END, np.cos(2.0 * np.minimum(angle, CORNER_END)), 0.0)
 
 
 def path_waves(ranger: str, target: str, *, index_ppm: float, streams: Streams, planted: Planted) -> Waves:

@@ -9,13 +9,14 @@ import numpy as np
 from catseye.aliases import Array
 from catseye.errors import InputError
 from catseye.records.site.folder import SiteFolder
+from catseye.records.site.retroreflector import HOLLOW
 from catseye.simulator.night.faults import Planted, Streams
 from catseye.simulator.night.head import USUAL_VOLT
 from catseye.simulator.twin.stations import BeamAtMirror, TrueStation, stations
-from catseye.simulator.twin.targets import PRISM_RADIUS, BodyRetroreflector, drawing, retroreflectors
+from catseye.simulator.twin.targets import CORNER_RADIUS, BodyRetroreflector, drawing, retroreflectors
 from catseye.simulator.twin.telescope import TelescopeState, low_orders, turning
 
-ASIDE = PRISM_RADIUS + 0.15  # m: distance from the beam within which a target is checked closely; bending is far below
+ASIDE = CORNER_RADIUS + 0.15  # m: distance from the beam within which a target is checked closely; bending is far below
 NEAREST = 0.5  # m: nearer objects belong to the ranger
 
 
@@ -65,7 +66,7 @@ class TwinPlaces:
         self.retros: dict[str, BodyRetroreflector] = retroreflectors(site, certified, draw)
         for name, s in self.stations.items():  # a ranger shows others the retroreflector in its mirror's back
             rest_place = s.place if s.body == "arm" else certified[name]
-            self.retros[name] = BodyRetroreflector("hollow", s.body, rest_place, None, (), USUAL_VOLT["arm"])
+            self.retros[name] = BodyRetroreflector(HOLLOW, s.body, rest_place, None, (), USUAL_VOLT["arm"])
         self._surface = draw.surface
         self._dish_middle = np.array([*draw.surface.centre, draw.surface.height(draw.surface.centre)])
         self._crowds = {body: self._crowd(body) for body in ("ground", "alidade", "dish", "arm")}

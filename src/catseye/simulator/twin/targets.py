@@ -11,6 +11,7 @@ import numpy as np
 from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.records.site.folder import SiteFolder
+from catseye.records.site.retroreflector import GlassForm, RetroreflectorKind
 from catseye.records.site.target import FrameName
 from catseye.records.site.target import TargetRow as TargetRecord
 from catseye.records.site.triplet import TripletPrism, TripletRecord
@@ -22,32 +23,37 @@ from catseye.simulator.twin.telescope import low_orders
 TYPING_MM, MOST_TYPING = 8.0, 2.0  # of each coordinate without a record; clipped at so many sigma
 SURFACE_MM, ROUGH_MM = 0.25, 0.15  # normal deviations of the dish: low orders, and from prism to prism
 NEAR_SURFACE, BEYOND_RIM = 2.0, 3.0  # m: points nearer to the paraboloid belong to the dish, others to the feed arm
-PRISM_RADIUS, BALL_RADIUS = 0.045, 0.050  # m: largest offset of a returned beam
+CORNER_RADIUS, BALL_RADIUS = 0.045, 0.050  # m: largest offset of a returned beam
 
 
 @dataclass(frozen=True, eq=False)
 class BodyRetroreflector:
     """Retroreflector in the frame of its body.
 
-    kind         "prism", "ball" or "hollow"
+    kind         facts of its kind: form of glass, axis
     body         "ground", "alidade", "dish" or "arm"
     rest_place   (3,) m, true
-    facing       (3,) unit vector: outward normal of the entry face, a ball's axis; None: any direction
+    facing       (3,) unit vector: outward axis; None for a kind without one: any direction
     sizes        m, true: height of the prism; both radii of the ball
     volts        limits of its usual amplitude
+
+    Raises InputError for a kind with an axis that lacks it.
     """
 
-    kind: str
+    kind: RetroreflectorKind
     body: str
     rest_place: Array
     facing: Array | None
     sizes: tuple[float, ...]
     volts: tuple[float, float]
 
+    def __post_init__(self) -> None:
+        self.kind.axis_of(f"retroreflector on the {self.body}", self.facing)
+
     @property
     def radius(self) -> float:
         """Largest offset of a returned beam, m."""
-        return BALL_RADIUS if self.kind == "ball" else PRISM_RADIUS
+        return BALL_RADIUS if self.kind.glass is GlassForm.SPHERES else CORNER_RADIUS
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,14 +153,15 @@ def single(record: TargetRecord, draw: Drawing) -> BodyRetroreflector:
         rest_place = rest_place + miss
     facing: Array | None = None
     sizes: tuple[float, ...] = ()
-    if record.normal is not None and record.height_mm is not None:
+    if record.normal is not None:
         normal = unit(np.array(record.normal))
         facing = unit(normal + np.cross(normal, draw.planted.gain("normals") * 0.1 * DEGREE * lean))
+    if record.height_mm is not None:
         u = draw.planted.gain("calibration") * (record.u_height_mm or 0.0)
         sizes = ((record.height_mm + u * rng.normal()) * MILLIMETRE,)
     body = draw.body(record.frame, rest_place)
-    volts = USUAL_VOLT["hollow" if facing is None else "dish" if body == "dish" else "prism"]
-    return BodyRetroreflector(record.type, body, rest_place, facing, sizes, volts)
+    volts = USUAL_VOLT["single" if facing is None else "dish" if body == "dish" else "plate"]
+    return BodyRetroreflector(record.kind, body, rest_place, facing, sizes, volts)
 
 
 def triplet(record: TripletRecord, draw: Drawing) -> dict[str, BodyRetroreflector]:
@@ -182,11 +189,13 @@ def triplet(record: TripletRecord, draw: Drawing) -> dict[str, BodyRetroreflecto
     def prism(side: TripletPrism, sign: float) -> BodyRetroreflector:
         height = (side.height_mm + gain("calibration") * side.u_height_mm * rng.normal()) * MILLIMETRE
         return BodyRetroreflector(
-            "prism", body, middle + sign * 0.5 * d12 * axis, normal, (height,), USUAL_VOLT["prism"]
+            side.kind, body, middle + sign * 0.5 * d12 * axis, normal, (height,), USUAL_VOLT["plate"]
         )
 
     return {
         record.left_prism.target: prism(record.left_prism, -1.0),
         record.right_prism.target: prism(record.right_prism, 1.0),
-        record.ball.target: BodyRetroreflector("ball", body, ball, -normal, (r1, r2), USUAL_VOLT["ball"]),
+        record.ball.target: BodyRetroreflector(
+            record.ball.kind, body, ball, -normal, (r1, r2), USUAL_VOLT["underside"]
+        ),
     }

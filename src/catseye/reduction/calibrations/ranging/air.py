@@ -4,12 +4,13 @@ Group index of the ranger, phase index of the interferometer.
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 
 from catseye.atmosphere.index.air import air
 from catseye.constants import PPM, SPEED_OF_LIGHT
+from catseye.names import AIR_MODEL, AirModelName
 from catseye.records.files.readings import Sheet, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.fit import Effect
@@ -36,7 +37,7 @@ class AirSheet(Sheet):
     modulation_hz: Annotated[float, Within(1e7, 1e11)]
     u_modulation_ppm: Annotated[float, Within(0, 1000)]
     wavelength_um: Annotated[float, Within(0.3, 1.7)] = 0.780
-    air_model: Literal["ciddor_hill1999", "rueger1990", "iag1999_closed", "barrell_sears1963"] = "ciddor_hill1999"
+    air_model: AirModelName = AIR_MODEL
     temperature_c: Annotated[float, WEATHER["temperature_c"]] | None = None
     pressure_hpa: Annotated[float, WEATHER["pressure_hpa"]] | None = None
     humidity_percent: Annotated[float, WEATHER["humidity_percent"]] | None = None

@@ -6,7 +6,7 @@
     back_mirror_cube  one of the cubes in the back of a servo mirror     the same, and the mirror's face behind it
 
 Each has its own axes, z along its axis towards the ranger, and is used at an `incidence` from z and an `azimuth`
-about z, of the direction to the ranger. A new kind is one file with these members.
+about z, of the direction to the ranger. What files and rooms call a kind is in `kinds`.
 """
 
 from typing import NamedTuple, Protocol

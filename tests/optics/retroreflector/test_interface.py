@@ -16,7 +16,7 @@ from catseye.optics.retroreflector.back_mirror_cube import BackMirrorCube
 from catseye.optics.retroreflector.cats_eye import BallCatsEye, focal_radius
 from catseye.optics.retroreflector.corner_polarization import returned_power
 from catseye.optics.retroreflector.hollow_cube import HollowCube
-from catseye.optics.retroreflector.kinds import fresnel
+from catseye.optics.retroreflector.interface import fresnel
 from catseye.optics.retroreflector.solid_prism import SolidPrism
 
 GROUP, PHASE = 1.527077, 1.510811

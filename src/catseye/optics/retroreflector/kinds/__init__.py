@@ -1,0 +1,1 @@
+"""Kinds of retroreflector, a file each, and their registry."""
