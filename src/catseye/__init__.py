@@ -14,7 +14,9 @@ from catseye.errors import ArgumentError, CatseyeError, EstimationError, FrameEr
 from catseye.version import __version__
 
 if TYPE_CHECKING:
-    from catseye.api.laboratory import baseline, calibrate, triplet
+    from catseye.api.air_paths import acoustic, refractometer
+    from catseye.api.baseline import baseline
+    from catseye.api.laboratory import calibrate, certificate, save_triplet_form, triplet
     from catseye.api.living import replay, simulate
     from catseye.api.network import adjust, compare
     from catseye.api.night import explain, night, reduce
@@ -30,10 +32,12 @@ if TYPE_CHECKING:
     from catseye.api.structure import structure
     from catseye.api.surface import surface
     from catseye.api.track_profile import track_pointing
-    from catseye.api.weather import air, refractometer, sound
+    from catseye.api.weather import air, sound
 
 FACE = {  # file of catseye.api -> its exported names
-    "laboratory": ("baseline", "calibrate", "triplet"),
+    "air_paths": ("acoustic", "refractometer"),
+    "baseline": ("baseline",),
+    "laboratory": ("calibrate", "certificate", "save_triplet_form", "triplet"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare"),
     "night": ("explain", "night", "reduce"),
@@ -49,7 +53,7 @@ FACE = {  # file of catseye.api -> its exported names
     "structure": ("structure",),
     "surface": ("surface",),
     "track_profile": ("track_pointing",),
-    "weather": ("air", "refractometer", "sound"),
+    "weather": ("air", "sound"),
 }
 
 __all__ = [
@@ -60,11 +64,13 @@ __all__ = [
     "InputError",
     "ValidityError",
     "__version__",
+    "acoustic",
     "adjust",
     "air",
     "baseline",
     "beam",
     "calibrate",
+    "certificate",
     "compare",
     "examples",
     "explain",
@@ -84,6 +90,7 @@ __all__ = [
     "replay",
     "safety",
     "save",
+    "save_triplet_form",
     "show",
     "simulate",
     "sound",

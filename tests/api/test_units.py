@@ -21,7 +21,7 @@ import catseye
 import catseye.api
 from catseye.api.units import In, declared, plain, plain_arguments, unit_of_name, with_units
 from catseye.errors import InputError
-from catseye.reduction.baseline.lengths import BaselineSettings
+from catseye.reduction.baseline.settings import BaselineSettings
 
 NUMBERS = re.compile(r"\b(float|int|complex|object|Any|ndarray|NDArray|ArrayLike|number|Number|Quantity)\b")
 OUR_OWN = {  # functions that people do not call: what goes in is catseye's own numbers
@@ -49,6 +49,8 @@ OTHER = {  # unit of ours -> another unit, and what one of ours is in it, by han
     "mmHg": ("hPa", 1.33322387415),
     "min": ("s", 60.0),
     "GHz": ("MHz", 1e3),
+    "Hz": ("kHz", 1e-3),
+    "mrad / h(1/2)": ("rad / h(1/2)", 1e-3),
     "": ("percent", 100.0),
     "mjd": ("h", 24.0),
 }
@@ -115,7 +117,8 @@ def test_the_unit_declared_is_the_one_of_the_name(function, argument, unit):
             "s",
             "m / s2",
             "min",
-        )  # no ending: SI, or a pure number; `minutes` says it whole
+            "mrad / h(1/2)",
+        )  # no ending: SI, a pure number, or said whole
 
 
 def arguments(function, argument, value):

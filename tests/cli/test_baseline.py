@@ -113,7 +113,7 @@ def test_quiet_is_quiet(catseye):
         ([TS30, "--measured-on", "yesterday"], 2, "yesterday"),
         ([TS30, "--level", "5"], 2, "probability"),
         ([TS30, "--reference-height-m", "-8e6"], 2, "-9000 to 9000 m"),
-        ([TS30, "--reference-height-m", "10"], 1, "needs --heights"),
+        ([TS30, "--reference-height-m", "10"], 2, "needs --heights"),
         ([], 2, "OBSERVATIONS.csv"),
     ],
 )

@@ -187,9 +187,9 @@ def test_files_appear_whole_and_only_where_catseye_may_write(catseye, tmp_path):
         (("leakage", EXAMPLES / "leakage.csv", "--sheet", EXAMPLES / "linearity.toml"), "linearity.toml"),
         (
             ("leakage", EXAMPLES / "leakage.csv", "--write", EXAMPLES / "leakage.toml"),
-            "is an input of this calibration",
+            "is an input (expected another name)",
         ),
-        (("leakage", EXAMPLES / "leakage.csv", "--write", "x", "--certificate", "x"), "is the --certificate too"),
+        (("leakage", EXAMPLES / "leakage.csv", "--write", "x", "--certificate", "x"), "is the record too"),
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_status_1(catseye, tmp_path, monkeypatch, arguments, said):

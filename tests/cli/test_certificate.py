@@ -65,8 +65,8 @@ def test_people_are_told_what_stayed_blank_and_our_page_may_be_replaced(catseye,
         (("monument", "no.toml", "--out", "x.html"), "no.toml: missing"),
         (("monument", ZP3, "--out", "x.html"), "ZP3.toml: "),
         (("mirror", ZY3, "--json"), "ZY3.toml: "),
-        (("monument", ZY3, "--out", "no/x.html"), "--out no/x.html: cannot be written"),
-        (("monument", ZY3, "--out", ZY3), "is the record that fills the page"),
+        (("monument", ZY3, "--out", "no/x.html"), "page no/x.html: its directory does not exist"),
+        (("monument", ZY3, "--out", ZY3), "is an input (expected another name)"),
         (("monument", ZY3, "--out", "."), "is a directory"),
     ],
 )
@@ -106,7 +106,7 @@ def test_a_bad_record_is_refused_with_key_value_and_limit(catseye, tmp_path, old
     [
         (("bogus", "--out", "x"), "'bogus' is not one of monument, mirror"),
         (("monument", ZY3), "is needed unless --json is given"),
-        (("monument", ZY3, "--blank", "--out", "x"), "takes no RECORD"),
+        (("monument", ZY3, "--blank", "--out", "x"), "--blank takes no record"),
         ((), "KIND"),
     ],
 )

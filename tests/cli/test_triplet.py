@@ -119,7 +119,7 @@ def test_sheets_of_one_name_are_not_written_over_each_other(catseye, tmp_path):
     twin.write_bytes(ONE.read_bytes())
     status, _, complaint = catseye(ONE, twin, "--out", tmp_path / "out")
     assert status == 1
-    assert "expected sheets of different names for --out" in complaint
+    assert "expected sheets of different names in one output" in complaint
     assert not (tmp_path / "out").exists()
     assert catseye(ONE, twin, "--json")[0] == 0  # told apart by their order
 

@@ -15,7 +15,6 @@ from catseye.errors import EstimationError
 from catseye.estimation.network import datum
 from catseye.estimation.quality.robustness import WEIGHTS
 from catseye.estimation.shapes import paraboloid, pose
-from catseye.gateways.calibrations.field_report_fields import FORMS
 from catseye.gateways.journal.export import Form
 from catseye.geometry.antenna import pointing_series
 from catseye.optics import zernike
@@ -24,6 +23,7 @@ from catseye.optics.safety import limits
 from catseye.ranger import addresses
 from catseye.records.site.target import FrameName
 from catseye.reduction.calibrations import kinds
+from catseye.reduction.calibrations.field_report import FORMS
 from catseye.reduction.network.treatment import AdjustmentOptions
 from catseye.reduction.pose import pointing_offsets
 from catseye.reduction.pose import pose as pose_recipe

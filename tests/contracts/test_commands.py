@@ -18,6 +18,7 @@ import catseye as catseye_package
 from catseye import __version__
 from catseye.atmosphere.index.air import MODELS
 from catseye.cli.commands import app
+from catseye.cli.inputs import WRITTEN
 from catseye.cli.vocabularies import AIR_MODELS
 from command_scene import command_line
 from process_scene import ends_with_us
@@ -246,9 +247,13 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 
 
 ONE_CALL = [
+    "acoustic",
     "adjust",
     "air",
+    "baseline",
     "beam",
+    "calibrate",
+    "certificate",
     "explain",
     "glass",
     "link",
@@ -261,14 +266,15 @@ ONE_CALL = [
     "panels",
     "pose",
     "reduce",
+    "refractometer",
     "replay",
     "safety",
     "sound",
+    "triplet",
     "structure",
     "surface",
 ]
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
-WRITERS = {"certificate", "template", "write", "write_stars"}  # files that are methods of the result
 OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
 
 
@@ -287,6 +293,12 @@ def python_name(words):
     return "_".join(reversed(words.split())).replace("-", "_")
 
 
+def signatures(words):
+    """Parameters of a command, and of its function."""
+    function = getattr(catseye_package, python_name(words))
+    return inspect.signature(callbacks()[words]).parameters, inspect.signature(function).parameters
+
+
 def test_a_command_of_a_group_has_its_verb_first_in_python():
     assert (python_name("air"), python_name("pointing fit")) == ("air", "fit_pointing")
     assert set(ONE_CALL) <= set(callbacks())
@@ -294,7 +306,18 @@ def test_a_command_of_a_group_has_its_verb_first_in_python():
 
 @pytest.mark.parametrize("words", ONE_CALL)
 def test_function_takes_every_option_of_its_command(words):
-    options = set(inspect.signature(callbacks()[words]).parameters) - OF_THE_TERMINAL - WRITERS
+    options, parameters = signatures(words)
     renamed = OTHER_NAMES.get(words, {})
-    arguments = set(inspect.signature(getattr(catseye_package, python_name(words))).parameters)
-    assert {renamed.get(option, option) for option in options} <= arguments
+    assert {renamed.get(option, option) for option in set(options) - OF_THE_TERMINAL - WRITTEN} <= set(parameters)
+
+
+@pytest.mark.parametrize("words", ONE_CALL)
+def test_function_has_the_defaults_of_its_command(words):
+    options, parameters = signatures(words)
+    defaults = {key: options[key].default for key in set(options) & set(parameters) - OF_THE_TERMINAL}
+    stated = {
+        key: value
+        for key, value in defaults.items()
+        if isinstance(value, bool | int | float | str) and parameters[key].default is not None
+    }
+    assert stated == pytest.approx({key: parameters[key].default for key in stated})

@@ -14,6 +14,7 @@ from catseye.optics.glass import GLASSES, absolute_index, phase_index, reference
 from catseye.optics.retroreflector.warm_prism import warm_prism, warm_prism_slopes
 from catseye.optics.safety.hazard import LaserBeam, classify, exceeds, hazard_zone
 from catseye.optics.safety.limits import CLASSES, eye_limits
+from catseye.reduction.optics.glass import glass_state
 
 glasses = st.sampled_from(sorted(GLASSES))
 AIR = {"air_phase": 1.00024848, "air_group": 1.00025325}
@@ -52,7 +53,7 @@ def test_an_index_of_glass_changes_by_the_integral_of_its_slopes(glass, um, cold
 
 @given(glasses, st.floats(0.42, 1.0), st.floats(-100.0, 140.0), st.floats(5.0, 100.0))
 def test_the_command_is_consistent_about_a_glass(glass, um, temperature_c, height_mm):
-    found = glass_object(glass, um, temperature_c, height_mm=height_mm)
+    found = glass_object(glass_state(glass, um, temperature_c, height_mm=height_mm))
     own, h = found["prism"], height_mm * 1e-3 * (1.0 + found["expansion_per_c"] * (temperature_c - 20.0))
     n = own["group_index_over_air"]
     assert own["range_constant"] == pytest.approx(-(n - 1.0 / n) * h, rel=1e-12)

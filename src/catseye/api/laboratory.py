@@ -1,30 +1,26 @@
-"""`calibrate`, `triplet` and `baseline`: what the laboratory and the EDM baseline say of instruments and targets."""
+"""`calibrate`, `certificate`, `triplet`: instruments and targets measured in the laboratory."""
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from catseye.aliases import Progress
 from catseye.api.reading import place_of
-from catseye.api.result import Result, digest_of, quantities
-from catseye.api.units import In, with_units
+from catseye.api.result import Result, SinglePage, digest_of, quantities
 from catseye.constants import MILLIMETRE
-from catseye.errors import InputError
+from catseye.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.reduction.baseline.instrument import BaselineCalibration
-    from catseye.reduction.baseline.lengths import BaselineSettings
     from catseye.reduction.calibrations.calibration import Calibration
+    from catseye.reduction.calibrations.field_report import Report
     from catseye.reduction.triplet.result import TripletReduction
 
 
@@ -70,7 +66,7 @@ class CalibrationResult(Result):
         return calibration_object(self.calibration)
 
     def tables(self) -> "dict[str, QTable]":
-        """`quantities`: a row a quantity, in its own unit, which stands beside it; `readings`: a row a reading."""
+        """`quantities`: a row a quantity, in its unit; `readings`: a row a reading."""
         found = self.calibration.quantities
         columns = {
             "quantity": (self.keys, ""),
@@ -90,18 +86,22 @@ class CalibrationResult(Result):
 
         return {"readings": calibration_figure(self.calibration)}
 
+    def pages(self) -> dict[str, SinglePage]:
+        """`record`, to keep with the instrument's; `certificate`, a page to sign."""
+        from catseye.gateways.calibrations.certificate import MARK as PAGE_MARK
+        from catseye.gateways.calibrations.certificate import certificate as drawn
+        from catseye.gateways.calibrations.certificate_record import MARK, calibration_toml
+
+        return {
+            "record": SinglePage(MARK, lambda now, path: calibration_toml(self.calibration)),
+            "certificate": SinglePage(PAGE_MARK, lambda now, path: drawn(self.calibration, now), html=True),
+        }
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """record.toml and certificate.html, as --write and --certificate have them, with tables, figure and JSON."""
-        from catseye.gateways.calibrations.certificate import certificate
-        from catseye.gateways.calibrations.certificate_record import calibration_toml
-
-        def record(now: "datetime") -> str:
-            return calibration_toml(self.calibration)
-
-        def page(now: "datetime") -> str:
-            return certificate(self.calibration, now)
-
-        self.write_files(directory, progress, {"record.toml": record, "certificate.html": page})
+        """Write record.toml and certificate.html with tables, figure and JSON."""
+        self.write_files(
+            directory, progress, self.page_texts({"record.toml": "record", "certificate.html": "certificate"})
+        )
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of the readings and of their sheet."""
@@ -119,7 +119,7 @@ def calibrate(
     *,
     reject: bool = False,
 ) -> CalibrationResult:
-    """A calibration from a table of readings: quantities with covariance, residuals and tests.
+    """Calibration from a table of readings: quantities with covariance and tests.
 
     kind       what is calibrated, as `catseye calibrate --help` lists
     readings   table (docs/formats/calibrations.md)
@@ -132,28 +132,129 @@ def calibrate(
     >>> calibrate("linearity", "calibrations/linearity.csv").kind
     'linearity'
     """
-    from catseye.gateways.calibrations.certificate_record import calibration_verdict
     from catseye.reduction.calibrations.kinds import calibrate as calibrated
 
     table = place_of(readings)
     beside = None if sheet is None else place_of(sheet)
     found = calibrated(kind, table, beside, reject=reject)
     return CalibrationResult(
-        calibration_verdict(found),
-        found.kind,
-        tuple(q.key for q in found.quantities),
-        np.array([q.value for q in found.quantities]),
-        np.array([q.u for q in found.quantities]),
-        np.asarray(found.covariance),
-        dict(found.record),
-        found,
-        (table, table.with_suffix(".toml") if beside is None else beside),
+        verdict=found.verdict,
+        kind=found.kind,
+        keys=tuple(q.key for q in found.quantities),
+        values=np.array([q.value for q in found.quantities]),
+        u=np.array([q.u for q in found.quantities]),
+        covariance=np.asarray(found.covariance),
+        record=dict(found.record),
+        calibration=found,
+        read=(table, table.with_suffix(".toml") if beside is None else beside),
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CertificateResult(Result):
+    """Calibration report of a monument or a mirror: f fields.
+
+    kind      "monument" or "mirror"
+    keys      of the fields in the record
+    missing   keys of the fields that the record lacks
+    report    every field with its value, u and unit; provenance
+    read      file that was read; None: a blank form
+    page      file that was written; None: none
+    """
+
+    kind: str
+    keys: tuple[str, ...]
+    missing: tuple[str, ...]
+    report: "Report"
+    read: Path | None
+    page: Path | None = None
+
+    def passages(self) -> "Sequence[Passage]":
+        """Title and number of the report, and the missing fields."""
+        from catseye.gateways.calibrations.field_report_fields import report_passages
+
+        return report_passages(self.report)
+
+    def to_object(self) -> dict[str, Any]:
+        """JSON object of `catseye certificate --json`."""
+        from catseye.gateways.calibrations.field_report_fields import report_object
+
+        return report_object(self.report, None if self.page is None else str(self.page))
+
+    def tables(self) -> "dict[str, QTable]":
+        """`fields`: a row a field of the form."""
+        fields = self.report.fields
+        columns = {
+            "field": ([each.entry.name for each in fields], ""),
+            "key": ([each.entry.key for each in fields], ""),
+            "value": (["" if each.value is None else str(each.value) for each in fields], ""),
+            "u": ([np.nan if each.u is None else each.u for each in fields], ""),
+            "unit": ([each.entry.unit for each in fields], ""),
+        }
+        return {"fields": quantities(columns)}
+
+    def pages(self) -> dict[str, SinglePage]:
+        """`page`: the report, to print and sign."""
+        from catseye.gateways.calibrations.field_report import field_report, mark
+
+        return {"page": SinglePage(mark(self.kind), lambda now, path: field_report(self.report, now), html=True)}
+
+    def save_page(self, path: "str | os.PathLike[str]") -> "CertificateResult":
+        """Write the report, to print and sign.
+
+        path   new, or an earlier page of catseye; its name ends in .html
+
+        Returns the result with the name of its page. Raises InputError where nothing can be written.
+        """
+        self.save_pages(page=Path(path))
+        return replace(self, page=Path(path))
+
+    def write(self, directory: Path, progress: Progress | None = None) -> None:
+        """Write certificate.html with table and JSON."""
+        self.write_files(directory, progress, self.page_texts({"certificate.html": "page"}))
+
+    def inputs(self) -> dict[str, str]:
+        """SHA-256 of the record, by its name."""
+        return {self.report.file: self.report.sha256} if self.report.file else {}
+
+    def sources(self) -> tuple[Path, ...]:
+        """Record that fills the form."""
+        return () if self.read is None else (self.read,)
+
+
+def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, blank: bool = False) -> CertificateResult:
+    """Calibration report of a monument or a mirror, filled or blank.
+
+    kind     "monument" or "mirror"
+    record   record that fills it; None: a blank form
+    blank    a blank form, for which there is no record
+
+    Raises InputError for a record that cannot be used; ArgumentError: an unknown kind, a blank form with a record.
+
+    >>> certificate("monument", "monuments/ZY3.toml").missing[:2]
+    ('measured_on', 'by')
+    """
+    from catseye.reduction.calibrations.field_report import FORMS, blank_report, read_report
+
+    if kind not in FORMS:
+        raise ArgumentError(f"kind = {kind!r} is unknown (expected one of {', '.join(FORMS)})", "kind")
+    if blank and record is not None:
+        raise ArgumentError("blank takes no record", "blank")
+    path = None if record is None else place_of(record)
+    report = blank_report(kind) if path is None else read_report(kind, path)
+    return CertificateResult(
+        verdict=report.verdict,
+        kind=kind,
+        keys=tuple(each.entry.key for each in report.fields),
+        missing=tuple(entry.key for entry in report.missing),
+        report=report,
+        read=path,
     )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TripletsResult(Result):
-    """Triplet units measured in the laboratory, n of them, in the order of their sheets.
+    """Triplet units measured in the laboratory: n, in the sheets' order.
 
     names         of the units
     h_corr, u_h_corr       (n,) m: ball centre above the prisms' mid-point, towards the prism side
@@ -181,14 +282,20 @@ class TripletsResult(Result):
         from catseye.gateways.triplet.sheet import results
         from catseye.gateways.writers.passage import Passage
 
-        told = []
+        passages = []
         for path, unit in self.units:
             named = [Passage(unit.measurement.triplet, path.name)] if len(self.units) > 1 else []
-            told += [*named, *(Passage(title, text) for title, text in results(unit))]
-        return told
+            passages += [*named, *(Passage(title, text) for title, text in results(unit))]
+        return passages
+
+    def sheet(self) -> str:
+        """Sheets with every symbol of the memo, as text."""
+        from catseye.gateways.triplet.sheet import text_sheet
+
+        return "\n".join(text_sheet(unit, path.name).rstrip() for path, unit in self.units)
 
     def to_object(self) -> Any:
-        """JSON object of `catseye triplet --json`: one object, or a list of them for several sheets."""
+        """JSON object of `catseye triplet --json`; a list for several sheets."""
         from catseye.gateways.triplet.objects import triplet_object
 
         objects = [triplet_object(unit, path.name) for path, unit in self.units]
@@ -216,8 +323,9 @@ class TripletsResult(Result):
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye triplet --out`."""
-        from catseye.gateways.triplet.files import write_triplets
+        from catseye.gateways.triplet.files import refuse_namesakes, write_triplets
 
+        refuse_namesakes([path for path, _ in self.units])
         write_triplets(dict(self.units), directory, self.hashes, progress=progress)
 
     def inputs(self) -> dict[str, str]:
@@ -229,10 +337,10 @@ class TripletsResult(Result):
         return tuple(path for path, _ in self.units)
 
 
-def triplet(*sheets: "str | os.PathLike[str]", progress: Progress | None = None) -> TripletsResult:
+def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) -> TripletsResult:
     """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not.
 
-    sheets     files of measured units (docs/formats/triplet.md)
+    files      sheets of measured units (docs/formats/triplet.md)
     progress   called with (what, done, of how many)
 
     Raises InputError for a sheet that cannot be used, and without any.
@@ -240,163 +348,50 @@ def triplet(*sheets: "str | os.PathLike[str]", progress: Progress | None = None)
     >>> triplet("triplets/TR01.toml").accepted.tolist()
     [True]
     """
-    from catseye.gateways.triplet.objects import triplet_verdict
-    from catseye.gateways.writers.verdict import worst
     from catseye.records.files.reading import Folder
     from catseye.records.laboratory.triplet_measurement import TripletMeasurement
     from catseye.reduction.triplet.unit import reduce_triplet
+    from catseye.verdict import worst
 
-    if not sheets:
+    if not files:
         raise InputError("triplet needs a sheet (expected one file or more)")
     units: list[tuple[Path, TripletReduction]] = []
     hashes: dict[Path, str] = {}
-    for done, sheet in enumerate(sheets):
+    for done, sheet in enumerate(files):
         path = place_of(sheet)
         if progress is not None:
-            progress("reducing", done, len(sheets))
+            progress("reducing", done, len(files))
         folder = Folder(path.parent)
         units.append((path, reduce_triplet(folder.record(path.name, TripletMeasurement))))
         hashes[path] = folder.hashes[path.name]
     found = [unit for _, unit in units]
     return TripletsResult(
-        worst([triplet_verdict(unit) for unit in found]),
-        tuple(unit.measurement.triplet for unit in found),
-        np.array([unit.h_corr for unit in found]),
-        np.array([unit.u_h_corr for unit in found]),
-        np.array([unit.l_mpbc for unit in found]),
-        np.array([unit.u_l_mpbc for unit in found]),
-        np.array([unit.difference for unit in found]),
-        np.array([unit.accepted for unit in found]),
-        np.array([unit.conformity_probability for unit in found]),
-        tuple(units),
-        hashes,
+        verdict=worst([unit.verdict for unit in found]),
+        names=tuple(unit.measurement.triplet for unit in found),
+        h_corr=np.array([unit.h_corr for unit in found]),
+        u_h_corr=np.array([unit.u_h_corr for unit in found]),
+        l_mpbc=np.array([unit.l_mpbc for unit in found]),
+        u_l_mpbc=np.array([unit.u_l_mpbc for unit in found]),
+        difference=np.array([unit.difference for unit in found]),
+        accepted=np.array([unit.accepted for unit in found]),
+        conformity_probability=np.array([unit.conformity_probability for unit in found]),
+        units=tuple(units),
+        hashes=hashes,
     )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class BaselineResult(Result):
-    """An EDM baseline: n pillars in their order along the line, and the instrument that measured it.
+def save_triplet_form(path: "str | os.PathLike[str]") -> Path:
+    """Write the blank form of a triplet's sheet.
 
-    pillars            names
-    x                  (n, 2) m: along the line from the first pillar, and to its left
-    zero, u_zero       m: observed = (1 + scale) distance + zero
-    scale_ppm, u_scale_ppm   nan where no known baseline tells it
-    calibration        everything else: sets, tests of ISO 17123-4, noise, budget
-    hashes             SHA-256 of each file read, by its name
-    read               files that were read
+    path   new, or an earlier form of catseye; its name ends in .html
+
+    Returns the path. Raises InputError where nothing can be written.
     """
+    from catseye.gateways.triplet.form import MARK, blank_form
+    from catseye.gateways.writers.output import atomic_file, refuse_suffix
 
-    pillars: tuple[str, ...]
-    x: np.ndarray
-    zero: float
-    u_zero: float
-    scale_ppm: float
-    u_scale_ppm: float
-    calibration: "BaselineCalibration"
-    hashes: dict[str, str] = field(default_factory=dict)
-    read: tuple[Path, ...] = ()
-
-    def passages(self) -> "Sequence[Passage]":
-        """The shots, zero, scale, scatter, tests and notes."""
-        from catseye.gateways.baseline.objects import passages
-
-        return passages(self.calibration)
-
-    def headline(self) -> "Sequence[Passage]":
-        """The three passages on shots, zero and scale."""
-        return self.passages()[:3]
-
-    def to_object(self) -> dict[str, Any]:
-        """JSON object of `catseye baseline --json`."""
-        from catseye.gateways.baseline.objects import baseline_object
-
-        return baseline_object(self.calibration)
-
-    def tables(self) -> "dict[str, QTable]":
-        """`distances`: a row a pair of pillars; `pillars`: a row a pillar."""
-        from catseye.gateways.baseline.objects import spans
-
-        pairs = spans(self.calibration)
-        distances = {
-            "from": ([s.start for s in pairs], ""),
-            "to": ([s.end for s in pairs], ""),
-            "distance": ([s.distance for s in pairs], "m"),
-            "u_distance": ([s.u / MILLIMETRE for s in pairs], "mm"),
-        }
-        pillars = {"pillar": (self.pillars, ""), "x": (self.x[:, 0], "m"), "y": (self.x[:, 1], "m")}
-        return {"distances": quantities(distances), "pillars": quantities(pillars)}
-
-    def figures(self) -> "dict[str, Figure]":
-        """The line, residuals, weather, corrections, and cyclic terms where there are such."""
-        from catseye.gateways.baseline.figures import baseline_figures
-
-        return baseline_figures(self.calibration)
-
-    def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Write the files of `catseye baseline --out`."""
-        from catseye.gateways.baseline.files import write_calibration
-
-        write_calibration(self.calibration, directory, self.hashes, progress=progress)
-
-    def inputs(self) -> dict[str, str]:
-        """SHA-256 of each file read."""
-        return self.hashes
-
-    def sources(self) -> tuple[Path, ...]:
-        """Files that `save` leaves alone: those read."""
-        return self.read
-
-
-@with_units
-def baseline(
-    observations: "str | os.PathLike[str]",
-    *,
-    heights: "str | os.PathLike[str] | None" = None,
-    against: "str | os.PathLike[str] | None" = None,
-    settings: Annotated["BaselineSettings | None", In("name")] = None,
-    progress: Progress | None = None,
-) -> BaselineResult:
-    """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests.
-
-    observations   shots with their weather (docs/formats/baseline.md)
-    heights        of pillars; level without
-    against        known pillars (BASELINE.toml): finds the instrument's scale, too
-    settings       air, instrument's claims, levels of tests: `catseye.reduction.baseline.lengths.BaselineSettings`;
-                   those of `catseye baseline` without
-    progress       called with (what, done, of how many)
-
-    Raises InputError for files that cannot be used and EstimationError where the pillars do not settle.
-    """
-    from catseye.gateways.baseline.objects import baseline_verdict
-    from catseye.records.laboratory.baseline import read_baseline, read_heights, read_observations
-    from catseye.reduction.baseline.instrument import calibrate_baseline
-    from catseye.reduction.baseline.lengths import BaselineSettings
-
-    given = [None if each is None else place_of(each) for each in (observations, heights, against)]
-    shots_file, heights_file, known_file = given
-    assert shots_file is not None
-    shots = read_observations(shots_file)
-    hashes = {shots_file.name: shots.digest}
-    tops = None
-    if heights_file is not None:
-        tops = read_heights(heights_file)
-        hashes[heights_file.name] = tops.digest
-    known = None
-    if known_file is not None:
-        known = read_baseline(known_file)
-        hashes[known_file.name] = digest_of(known_file)
-    found = calibrate_baseline(shots, tops, known, settings=settings or BaselineSettings(), progress=progress)
-    zero, u_zero = found.solution.of("zero")
-    scale, u_scale = found.solution.of("scale")
-    return BaselineResult(
-        baseline_verdict(found),
-        tuple(found.names[i] for i in found.order),
-        np.stack([found.solution.x, found.solution.y], axis=1)[found.order],
-        zero,
-        u_zero,
-        1e6 * scale,
-        1e6 * u_scale,
-        found,
-        hashes,
-        tuple(path for path in given if path is not None),
-    )
+    where = Path(path)
+    refuse_suffix(where, "form")
+    with atomic_file(where, "form", MARK) as pieces:
+        pieces.append(blank_form())
+    return where

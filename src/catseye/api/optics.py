@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from catseye.reduction.optics.link_budget import LinkBudget
 
 DISTANCES = (0.01, 1e6)  # m, of a beam's reflector
-HEIGHTS_MM = (1.0, 1000.0)  # of a prism: metres typed as millimetres are below
 SAFETY_ROWS = {  # column -> key of a duration's row, and unit
     "duration": ("duration", "s"),
     "mpe_eye": ("mpe_eye", "W / m2"),
@@ -46,7 +45,7 @@ class GlassResult(Result):
     values: Mapping[str, Any]
 
     def passages(self) -> "Sequence[Passage]":
-        """Indices, slopes, what a prism does to a range, and the cost of another glass."""
+        """Indices, slopes, effects of a prism, and errors of another glass."""
         from catseye.gateways.optics.glass_objects import glass_rows, table_rows
         from catseye.gateways.writers.passage import Passage
 
@@ -85,7 +84,7 @@ def glass(
     temperature_c: Annotated[Any, In("deg_C", one=True)] = 20.0,
     height_mm: Annotated[Any, In("mm", one=True)] = 38.1,
 ) -> GlassResult:
-    """Indices of a glass, their slopes, range constant of a prism of it, and the cost of another glass.
+    """Indices of a glass, a prism of it, and errors of another glass.
 
     name            of a glass; None: a table of all
     wavelength_um   in vacuum, µm
@@ -98,17 +97,13 @@ def glass(
     1.52746375
     """
     from catseye.gateways.optics.glass_objects import glass_object, table_object
-    from catseye.verdict import Verdict
+    from catseye.reduction.optics.glass import ALL_GLASSES, glass_state, require_height
 
-    if not HEIGHTS_MM[0] <= height_mm <= HEIGHTS_MM[1]:
-        low, high = HEIGHTS_MM
-        text = f"height_mm = {height_mm} is not a prism's height (expected {low:g} to {high:g})"
-        raise ArgumentError(text, "height_mm")
     if name is None:
-        values = table_object()
-    else:
-        values = glass_object(name, wavelength_um, temperature_c, height_mm=height_mm)
-    return GlassResult(Verdict(**values["verdict"]), name, values)
+        require_height(height_mm)
+        return GlassResult(ALL_GLASSES, None, table_object())
+    state = glass_state(name, wavelength_um, temperature_c, height_mm=height_mm)
+    return GlassResult(state.verdict, name, glass_object(state))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -194,7 +189,7 @@ def link(
     background_uw: Annotated[Any, In("uW", one=True)] = 0.0,
     measured_volt: Annotated[Any, In("V", one=True)] = None,
 ) -> LinkResult:
-    """Link budget: from the laser's power to the expected return and the noise of the range.
+    """Link budget: laser's power to expected return and range noise.
 
     distance             ranger to retroreflector, m
     incidence_deg        on the reflector's face, degrees
@@ -235,7 +230,7 @@ def link(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SafetyResult(Result):
-    """Limits of exposure, class and hazard distances of a beam: for planning, never a certificate.
+    """Limits of exposure, class and hazard distances: for planning, never a certificate.
 
     values   by JSON's keys
     """
@@ -286,7 +281,7 @@ def safety(
     subtense_mrad: Annotated[Any, In("mrad", one=True)] = 1.5,
     edition: str = "iec2014",
 ) -> SafetyResult:
-    """Laser safety of a beam: limits of exposure, class with reasons, hazard distances.
+    """Laser safety of a beam: limits of exposure, class, hazard distances.
 
     power_mw          of the beam, continuous, mW
     wavelength_um     0.4 to 1.4 µm
@@ -305,14 +300,12 @@ def safety(
     >>> safety(10.0, 0.780, 20.0, 0.05).values["class"]
     '3B'
     """
-    from catseye.gateways.optics.safety_objects import Question, safety_object
+    from catseye.gateways.optics.safety_objects import safety_object
     from catseye.optics.safety.hazard import LaserBeam
-    from catseye.verdict import Verdict
+    from catseye.reduction.optics.safety import SafetyQuestion, assess_safety
 
-    if scan_period_s is not None and scan_rad_per_s is None:
-        raise ArgumentError("scan_period_s needs scan_rad_per_s", "scan_period_s", "scan_rad_per_s")
-    values = safety_object(
-        Question(
+    assessment = assess_safety(
+        SafetyQuestion(
             LaserBeam(power_mw * 1e-3, wavelength_um, diameter_mm * MILLIMETRE, divergence_mrad * 1e-3, waist_distance),
             edition=edition,
             duration=duration_s,
@@ -324,12 +317,12 @@ def safety(
             reflector_diameter=reflector_diameter_mm * MILLIMETRE,
         )
     )
-    return SafetyResult(Verdict(**values["verdict"]), values)
+    return SafetyResult(assessment.verdict, safety_object(assessment))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BeamResult(Result):
-    """A laser beam through a head to a retroreflector and back to the detector.
+    """Laser beam through a head to a retroreflector and back.
 
     beam     sizes, clipping and power at each element
     source   file that was read
@@ -404,24 +397,23 @@ class BeamResult(Result):
         """Write the files of `catseye beam --out`."""
         from catseye.gateways.optics.beam_figures import write_beam
 
-        write_beam(self.beam, directory, dict(self.hashes))
+        write_beam(self.beam, directory, dict(self.hashes), progress)
 
 
 @with_units
 def beam(file: "str | os.PathLike[str]", *, distance_m: Annotated[Any, In("m", one=True)] = None) -> BeamResult:
-    """Sizes, clipping and power of a beam through lenses, mirrors and a retroreflector to the detector.
+    """Sizes, clipping and power of a beam, laser to detector.
 
     file         record of the beam's elements, laser to detector (docs/formats/beam.md)
     distance_m   to the reflector, m; None: that of the file
 
     Raises InputError: an invalid record; ArgumentError: a distance outside 0.01 to 1e6 m.
     """
-    from catseye.gateways.optics.beam_figures import beam_object, read_beam
-    from catseye.verdict import Verdict
+    from catseye.reduction.optics.beam import read_beam
 
     if distance_m is not None and not DISTANCES[0] <= distance_m <= DISTANCES[1]:
         low, high = DISTANCES
         raise ArgumentError(f"distance_m = {distance_m} is not within {low:g} to {high:g} m", "distance_m")
     source = place_of(file)
     path, hashes = read_beam(source, distance_m)
-    return BeamResult(Verdict(**beam_object(path)["verdict"]), path, source, hashes)
+    return BeamResult(path.verdict, path, source, hashes)

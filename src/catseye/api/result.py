@@ -2,12 +2,13 @@
 
 import hashlib
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from catseye.aliases import Progress
 from catseye.errors import InputError
@@ -19,16 +20,29 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.verdict import Verdict
+    from catseye.verdict import Verdict
 
 
 WIDTH = 100  # columns of a paragraph
 FORMAT = "catseye-result-1"  # of what `save` writes of a result that has no files of its own
 
 
+class SinglePage(NamedTuple):
+    """File that a result can write by itself.
+
+    mark   text in its first 4096 bytes that identifies a file of catseye, which may be replaced
+    text   its content, from the time of writing, UTC, and the path
+    html   True: its name ends in .html
+    """
+
+    mark: str
+    text: "Callable[[datetime, Path], str]"
+    html: bool = False
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """An answer: frozen, with its verdict; `repr` is a paragraph, a notebook shows all its sentences.
+    """Answer with its verdict; `repr` is a paragraph, a notebook shows all.
 
     verdict   whether it may be relied on: word ("good", "doubtful", "failed") and why
     """
@@ -36,7 +50,7 @@ class Result:
     verdict: "Verdict"
 
     def passages(self) -> "Sequence[Passage]":
-        """The sentences that the command prints, each under a word or two, without the verdict."""
+        """Sentences that the command prints, by title, without the verdict."""
         raise NotImplementedError
 
     def to_object(self) -> dict[str, Any]:
@@ -58,7 +72,7 @@ class Result:
         """Raise EstimationError where there is no answer."""
 
     def tables(self) -> "dict[str, QTable]":
-        """Every table of the answer by its name, the main one first; columns have units where they have one."""
+        """Tables of the answer by name, the main one first, with units."""
         raise NotImplementedError
 
     def to_table(self, name: str | None = None) -> "QTable":
@@ -77,8 +91,34 @@ class Result:
         """Figures by their names; none unless a result has some."""
         return {}
 
+    def pages(self) -> dict[str, SinglePage]:
+        """Single files by name, such as a record or a certificate."""
+        return {}
+
+    def page_texts(self, names: Mapping[str, str]) -> "dict[str, Callable[[datetime], str]]":
+        """Text of single files for `write_files`.
+
+        names   file in a directory -> name of `pages`
+        """
+        pages = self.pages()
+
+        def text(name: str, file: str, now: "datetime") -> str:
+            return pages[name].text(now, Path(file))
+
+        return {file: partial(text, name, file) for file, name in names.items()}
+
+    def save_pages(self, **paths: "str | Path | None") -> None:
+        """Write single files, all of them or none.
+
+        paths   name of `pages` -> file: new, or an earlier one of catseye; None: not written
+
+        Raises InputError for an unknown name, and where a foreign file would be lost or nothing can be written.
+        """
+        with _opened(self, paths):
+            pass
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Its files into a directory that is there and empty: tables as CSV, figures, the whole as JSON."""
+        """Write tables as CSV, figures and JSON into an empty directory."""
         self.write_files(directory, progress)
 
     def write_files(
@@ -87,7 +127,7 @@ class Result:
         progress: Progress | None = None,
         pages: "Mapping[str, Callable[[datetime], str]] | None" = None,
     ) -> None:
-        """The whole as JSON, each table as CSV, each figure as SVG, and pages; last the provenance.
+        """Write JSON, tables as CSV, figures as SVG, pages; last the provenance.
 
         pages   name -> what gives its text, told when it is made, UTC
         """
@@ -110,7 +150,7 @@ class Result:
         write_files(files, directory, {**made_by, **origin(now, self.inputs())}, progress=progress)
 
     def inputs(self) -> dict[str, str]:
-        """SHA-256 of each file that went in, by its name; none where there was no file."""
+        """SHA-256 of each input file, by its name."""
         return {}
 
     def sources(self) -> tuple[Path, ...]:
@@ -164,12 +204,15 @@ def show(result: Result, *names: str) -> Figures:
     return Figures({name: drawn[name] for name in names or drawn})
 
 
-def save(result: Result, directory: "str | Path", *, progress: Progress | None = None) -> Path:
-    """Write what the command's `--out` writes, whole or not at all.
+def save(
+    result: Result, directory: "str | Path", *, progress: Progress | None = None, **pages: "str | Path | None"
+) -> Path:
+    """Write the files of a result, whole or not at all.
 
     result      what a function of catseye gave
     directory   to be made: new, empty, or an earlier output of catseye
     progress    called with (what, done, of how many)
+    pages       single files beside it, by the names of `Result.pages`: record="TR01.toml"
 
     Returns the directory. Raises InputError where another's files would be lost or nothing can be written.
     """
@@ -181,7 +224,11 @@ def save(result: Result, directory: "str | Path", *, progress: Progress | None =
             f"save needs a result of catseye, not {type(result).__name__}; reduce, adjust and so on give one"
         )
     where = Path(directory)
-    with atomic_directory(where, *result.sources()) as fresh, free_threads():
+    with (
+        _opened(result, pages, where),
+        atomic_directory(where, *result.sources()) as fresh,
+        free_threads(),
+    ):
         result.write(fresh, progress)
     return where
 
@@ -224,15 +271,58 @@ def _csv_of(table: "QTable") -> str:
     return csv_text(heads, zip(*columns, strict=True))
 
 
-def require_writable(out: "Path | None", *sources: "str | Path") -> None:
+def require_writable(out: "Path | None", *sources: "str | Path | None", **pages: "str | Path | None") -> None:
     """Refuse an output that `save` would refuse, before the long work.
 
     out       directory to be written; None: none
-    sources   files and directories that are read
+    sources   files and directories that are read; None: none
+    pages     single files to be written, by their names; None: none
 
     Raises InputError where another's files would be lost or nothing can be written.
     """
     from catseye.gateways.writers.output import refuse_output
 
+    read = [Path(source) for source in sources if source is not None]
+    _require_pages({name: Path(path) for name, path in pages.items() if path is not None}, read, out)
     if out is not None:
-        refuse_output(out, *(Path(source) for source in sources))
+        refuse_output(out, *read)
+
+
+@contextmanager
+def _opened(result: Result, paths: "Mapping[str, str | Path | None]", directory: Path | None = None) -> Iterator[None]:
+    """Write single files of a result on success, all or none."""
+    from datetime import UTC, datetime
+
+    from catseye.gateways.writers.output import atomic_file, refuse_suffix
+
+    now, pages = datetime.now(UTC), result.pages()
+    named = {name: Path(path) for name, path in paths.items() if path is not None}
+    for name in named:
+        if name not in pages:
+            expected = f"expected one of {', '.join(pages)}" if pages else "it has none"
+            raise InputError(f"page {name!r} is not in this result ({expected})")
+    _require_pages(named, result.sources(), directory)
+    for name, path in named.items():
+        if pages[name].html:
+            refuse_suffix(path, name)
+    with ExitStack() as files:
+        for name, path in named.items():
+            files.enter_context(atomic_file(path, name, pages[name].mark)).append(pages[name].text(now, path))
+        yield
+
+
+def _require_pages(pages: Mapping[str, Path], sources: Sequence[Path], directory: Path | None) -> None:
+    """Raise InputError for a single file that may not be written."""
+    read = {source.resolve() for source in sources}
+    names: dict[Path, str] = {}
+    for name, path in pages.items():
+        where = path.resolve()
+        if where in read:
+            raise InputError(f"{name} {path}: is an input (expected another name)")
+        if where in names:
+            raise InputError(f"{name} {path}: is the {names[where]} too (expected two names)")
+        if not where.parent.is_dir():
+            raise InputError(f"{name} {path}: its directory does not exist (expected one that does)")
+        if directory is not None and directory.resolve() in (where, *where.parents):
+            raise InputError(f"{name} {path}: is or lies in {directory} (expected a place outside it)")
+        names[where] = name

@@ -3,7 +3,7 @@
 import math
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
 
@@ -13,11 +13,6 @@ from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import AIR_MODELS, one_of
-from catseye.errors import InputError
-
-if TYPE_CHECKING:
-    from catseye.api.laboratory import BaselineResult
-    from catseye.reduction.baseline.lengths import BaselineSettings
 
 FEW = 12  # pillars whose distances a terminal is told
 UNKNOWN = "unknown in the record where not given"
@@ -75,14 +70,9 @@ class _Inputs(NamedTuple):
         typer.Option("--against", metavar="BASELINE.toml", help="Known pillars: finds the instrument's scale, too."),
     ] = None
 
-    @property
-    def files(self) -> list[Path]:
-        """The input files that are given, in the order of the command line."""
-        return [path for path in (self.observations, self.heights, self.against) if path is not None]
-
 
 class _Settings(NamedTuple):
-    """Options of a baseline calibration; names say units, those without are m or plain numbers."""
+    """Options of a baseline calibration; without a unit m or numbers."""
 
     reference_index: Annotated[
         float, typer.Option("--reference-index", help="Group index for which the instrument shows lengths.")
@@ -94,7 +84,7 @@ class _Settings(NamedTuple):
         typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air."),
     ] = "ciddor_hill1999"
     corrected: Annotated[
-        bool, typer.Option("--corrected", help="The lengths carry the first velocity correction already.")
+        bool, typer.Option("--corrected", help="Lengths contain the first velocity correction already.")
     ] = False
     refraction: Annotated[
         float, typer.Option("--refraction-k", callback=_finite, help="Coefficient of refraction.")
@@ -103,62 +93,52 @@ class _Settings(NamedTuple):
         float | None,
         typer.Option("--reference-height-m", callback=_height, help="Height of the distances; the first pillar's."),
     ] = None
-    u_temperature_c: Annotated[float, _u("--u-temperature-c", "Common to all shots, °C (1σ).")] = 0.5
-    u_pressure_hpa: Annotated[float, _u("--u-pressure-hpa", "Common to all shots, hPa (1σ).")] = 0.3
-    u_humidity_percent: Annotated[float, _u("--u-humidity-percent", "Common to all shots, % (1σ).")] = 5.0
-    u_scale_ppm: Annotated[float, _u("--u-scale-ppm", "Of the instrument's frequency, without --against (1σ).")] = 1.0
+    u_temperature_c: Annotated[
+        float, _u("--u-temperature-c", "Standard uncertainty of the temperatures, common to all shots, °C (1σ).")
+    ] = 0.5
+    u_pressure_hpa: Annotated[
+        float, _u("--u-pressure-hpa", "Standard uncertainty of the pressures, common to all shots, hPa (1σ).")
+    ] = 0.3
+    u_humidity_percent: Annotated[
+        float, _u("--u-humidity-percent", "Standard uncertainty of the humidities, common to all shots, % (1σ).")
+    ] = 5.0
+    u_scale_ppm: Annotated[
+        float, _u("--u-scale-ppm", "Standard uncertainty of the instrument's frequency, without --against, ppm (1σ).")
+    ] = 1.0
     u_direction_arcsec: Annotated[
-        float, typer.Option("--u-direction-arcsec", callback=_above_zero, help="Of a set's direction (1σ).")
+        float,
+        typer.Option(
+            "--u-direction-arcsec", callback=_above_zero, help="Standard uncertainty of a set's direction, arcsec (1σ)."
+        ),
     ] = 0.6
-    u_centring_mm: Annotated[float, _u("--u-centring-mm", "Across the line, for directions, mm (1σ).")] = 0.2
+    u_centring_mm: Annotated[
+        float, _u("--u-centring-mm", "Standard uncertainty of centring across the line, for directions, mm (1σ).")
+    ] = 0.2
     unit_length_m: Annotated[
         float | None,
-        typer.Option("--unit-length-m", callback=_above_zero, help="Of cyclic terms: half a wave; none without."),
+        typer.Option(
+            "--unit-length-m", callback=_above_zero, help="Unit length of cyclic terms: half a wave, m; none without."
+        ),
     ] = None
-    orders: Annotated[int, typer.Option("--cyclic-orders", min=1, max=4, help="Of cyclic terms.")] = 1
+    cyclic_orders: Annotated[int, typer.Option("--cyclic-orders", min=1, max=4, help="Orders of cyclic terms.")] = 1
     specified_mm: Annotated[
         float, typer.Option("--specified-mm", callback=_above_zero, help="Maker's claim a + b D: a, mm (1σ).")
     ] = 0.6
     specified_ppm: Annotated[float, _u("--specified-ppm", "Maker's claim a + b D: b, ppm (1σ).")] = 1.0
     level: Annotated[float, typer.Option("--level", callback=_level, help="Level of each test.")] = 0.05
-    reject: Annotated[bool, typer.Option("--reject", help="Leave out what the tests reject, one by one.")] = False
-
-    def settings(self) -> "BaselineSettings":
-        """The same for the recipe, in its words."""
-        from catseye.reduction.baseline.lengths import BaselineSettings
-
-        return BaselineSettings(
-            air_model=self.model,
-            wavelength_um=self.wavelength_um,
-            co2_ppm=self.co2_ppm,
-            reference_index=self.reference_index,
-            corrected=self.corrected,
-            refraction=self.refraction,
-            u_temperature_c=self.u_temperature_c,
-            u_pressure_hpa=self.u_pressure_hpa,
-            u_humidity_percent=self.u_humidity_percent,
-            u_scale_ppm=self.u_scale_ppm,
-            u_direction_arcsec=self.u_direction_arcsec,
-            u_centring_mm=self.u_centring_mm,
-            unit_length=self.unit_length_m,
-            orders=self.orders,
-            specified_mm=self.specified_mm,
-            specified_ppm=self.specified_ppm,
-            level=self.level,
-            reject=self.reject,
-            reference_height=self.reference_height_m,
-        )
+    reject: Annotated[bool, typer.Option("--reject", help="Rejection of what the tests object to, one by one.")] = False
 
 
 class _Provenance(NamedTuple):
     """Provenance of the baseline: person, date, instrument."""
 
-    serial: Annotated[str | None, typer.Option("--serial", help=f"Of the instrument; {UNKNOWN}.")] = None
+    serial: Annotated[str | None, typer.Option("--serial", help=f"Serial number of the instrument; {UNKNOWN}.")] = None
     measured_on: Annotated[
-        str | None, typer.Option("--measured-on", callback=_day, metavar="YYYY-MM-DD", help=f"Day; {UNKNOWN}.")
+        str | None,
+        typer.Option("--measured-on", callback=_day, metavar="YYYY-MM-DD", help=f"Day of the shots; {UNKNOWN}."),
     ] = None
-    by: Annotated[str | None, typer.Option("--by", help=f"Who measured; {UNKNOWN}.")] = None
-    report: Annotated[str | None, typer.Option("--report", help=f"Where it is written up; {UNKNOWN}.")] = None
+    by: Annotated[str | None, typer.Option("--by", help=f"Person who measured; {UNKNOWN}.")] = None
+    report: Annotated[str | None, typer.Option("--report", help=f"Reference to the report; {UNKNOWN}.")] = None
 
 
 @app.command(
@@ -171,7 +151,8 @@ def baseline(
     *,
     read: _Inputs,
     write: Annotated[
-        Path | None, typer.Option("--write", metavar="BASELINE.toml", help="Keep the pillars with full covariance.")
+        Path | None,
+        typer.Option("--write", metavar="BASELINE.toml", help="Record of the pillars with full covariance to write."),
     ] = None,
     asked: _Settings,
     origin: _Provenance,
@@ -180,55 +161,22 @@ def baseline(
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """Pillars of an EDM baseline, and an instrument's zero, scale and cyclic terms, with ISO 17123-4's tests."""
-    if out is not None:
-        from catseye.gateways.writers.output import refuse_output
+    """Pillars of an EDM baseline, and the instrument's errors, with tests of ISO 17123-4."""
+    from catseye.api.baseline import baseline as calibrated
+    from catseye.api.result import require_writable, save
 
-        refuse_output(out, *read.files)
-    if write is not None and any(write.resolve() == source.resolve() for source in read.files):
-        raise InputError(f"--write {write}: is an input (expected another file: the same shots would count twice)")
+    require_writable(out, *read, record=write)
     progress = ProgressLine(quiet)
     try:
-        from catseye.api.laboratory import baseline as calibrated
-        from catseye.gateways.writers.output import atomic_directory
-
-        result = calibrated(
-            read.observations,
-            heights=read.heights,
-            against=read.against,
-            settings=asked.settings(),
-            progress=progress,
-        )
+        result = calibrated(**read._asdict(), **asked._asdict(), **origin._asdict(), progress=progress)
         if out is not None:
-            with atomic_directory(out, *read.files) as directory:
-                result.write(directory, progress)
-                _keep(result, write, origin)  # no directory without the record that was asked for, too
+            save(result, out, progress=progress, record=write)
         else:
-            _keep(result, write, origin)
+            result.save_pages(record=write)
     finally:
         progress.clear()
-    from catseye.gateways.baseline.objects import spans
-
-    few = spans(result.calibration) if len(result.pillars) <= FEW else []
-    rows = [f"{'':<14}{s.start:>6} - {s.end:<6} {s.distance:12.5f} m   u {s.u * 1e3:.3f} mm" for s in few]
+    rows = result.rows() if len(result.pillars) <= FEW else ()
     files = None if out is None else f"{out}/: report.html, pillars.csv, distances.csv, observations.csv, baseline.json"
-    kept = None if write is None else f"{write}: the pillars with their full covariance"
-    written = [("Written to", files), ("Written to", kept)]
+    record = None if write is None else f"{write}: the pillars with their full covariance"
+    written = [("Written to", files), ("Written to", record)]
     tell(result, json=json, quiet=quiet, strict=strict, rows=rows, written=written)
-
-
-def _keep(result: "BaselineResult", write: Path | None, origin: _Provenance) -> None:
-    if write is None:
-        return
-    from catseye.gateways.baseline.files import write_record
-
-    day = None if origin.measured_on is None else date.fromisoformat(origin.measured_on)
-    write_record(
-        result.calibration,
-        write,
-        result.hashes,
-        serial=origin.serial,
-        measured_on=day,
-        by=origin.by,
-        report=origin.report,
-    )

@@ -1,17 +1,13 @@
 """The command of the notes' calibration reports, filled or blank."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.terminal import say, wrapped
+from catseye.cli.results import tell
 from catseye.cli.vocabularies import REPORT_KINDS, one_of
-from catseye.errors import InputError
-
-if TYPE_CHECKING:
-    from catseye.gateways.calibrations.field_report_fields import Report
 
 
 @app.command(
@@ -24,7 +20,7 @@ def certificate(
         typer.Argument(
             metavar="KIND",
             callback=one_of(REPORT_KINDS),
-            help=f"What the report is of: {REPORT_KINDS.replace('|', ' or ')}.",
+            help=f"Subject of the report: {REPORT_KINDS.replace('|', ' or ')}.",
         ),
     ],
     record: Annotated[
@@ -38,44 +34,12 @@ def certificate(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """The calibration report of a monument or a mirror, as a page to print and sign."""
-    if blank and record is not None:
-        raise typer.BadParameter("takes no RECORD.", param_hint="'--blank'")
+    """Calibration report of a monument or a mirror, to print and sign."""
     if out is None and not json:
         raise typer.BadParameter("is needed unless --json is given.", param_hint="'--out'")
-    from catseye.gateways.calibrations.field_report_fields import blank_report, read_report, report_object
+    from catseye.api.laboratory import certificate as report_of
 
-    report = blank_report(kind) if record is None else read_report(kind, record)
+    result = report_of(kind, record, blank=blank)
     if out is not None:
-        _write(report, out, record)
-    if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(report_object(report, None if out is None else str(out))))
-    elif not quiet:
-        _tell(report, out)
-
-
-def _write(report: "Report", out: Path, record: Path | None) -> None:
-    """The page, whole or not at all."""
-    from datetime import UTC, datetime
-
-    from catseye.gateways.calibrations.field_report import field_report, mark
-    from catseye.gateways.writers.output import atomic_file, refuse_suffix
-
-    if record is not None and out.resolve() == record.resolve():
-        raise InputError(f"--out {out}: is the record that fills the page (expected another name)")
-    refuse_suffix(out, "--out")
-    with atomic_file(out, "--out", mark(report.kind)) as pieces:
-        pieces.append(field_report(report, datetime.now(UTC)))
-
-
-def _tell(report: "Report", out: Path | None) -> None:
-    from catseye.gateways.calibrations.field_report_fields import FORMS
-
-    number = report.fields[0].value
-    say(wrapped("Report", FORMS[report.kind].title + (f", {number}" if number else ", blank")))
-    if report.missing:
-        names = ", ".join(entry.key for entry in report.missing)
-        say(wrapped("Left blank", f"{len(report.missing)} of {len(report.fields)}, not in {report.file}: {names}"))
-    say(wrapped("Page", str(out)))
+        result = result.save_page(out)
+    tell(result, json=json, quiet=quiet, written=[("Page", out)])

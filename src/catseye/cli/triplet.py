@@ -25,7 +25,7 @@ def triplet(
         typer.Argument(metavar="FILE.toml ...", help="Sheets of measured units: docs/formats/triplet.md."),
     ] = None,
     blank: Annotated[
-        Path | None, typer.Option("--blank", metavar="SHEET.html", help="Write the blank form, to print and fill in.")
+        Path | None, typer.Option("--blank", metavar="SHEET.html", help="Blank form to write, to print and fill in.")
     ] = None,
     out: Out = None,
     json: Json = False,
@@ -37,9 +37,11 @@ def triplet(
         raise typer.BadParameter("at least one is needed, or --blank.", param_hint="'FILE.toml ...'")
     if not files and (out is not None or json):
         raise typer.BadParameter("are needed with --out and --json.", param_hint="'FILE.toml ...'")
+    from catseye.api.laboratory import save_triplet_form
+
     result = _reduced(files, out, quiet) if files else None
     if blank is not None:
-        _write_blank(blank)
+        save_triplet_form(blank)
     blanks = None if blank is None else f"{blank}: the blank form"
     if result is None:
         if not quiet:
@@ -48,10 +50,7 @@ def triplet(
     files_of = None if out is None else f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"
     written = [("Written to", files_of), ("Written to", blanks)]
     if len(result.units) == 1 and not json and not quiet:
-        from catseye.gateways.triplet.sheet import text_sheet
-
-        ((path, unit),) = result.units
-        say(text_sheet(unit, path.name).rstrip())
+        say(result.sheet())
         for title, text in written:
             if text is not None:
                 say(wrapped(title, text))
@@ -61,16 +60,11 @@ def triplet(
 
 
 def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "TripletsResult":
-    """Every sheet read and reduced, in order; with an `out`, written whole or not at all."""
+    """Sheets reduced, in order; with an `out`, written whole or not."""
     from catseye.api.laboratory import triplet as reduced
-    from catseye.api.result import save
+    from catseye.api.result import require_writable, save
 
-    if out is not None:
-        from catseye.gateways.triplet.files import refuse_namesakes
-        from catseye.gateways.writers.output import refuse_output
-
-        refuse_namesakes(files)
-        refuse_output(out, *files)
+    require_writable(out, *files)
     progress = ProgressLine(quiet)
     try:
         result = reduced(*files, progress=progress)
@@ -79,12 +73,3 @@ def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "TripletsResul
     finally:
         progress.clear()
     return result
-
-
-def _write_blank(path: Path) -> None:
-    from catseye.gateways.triplet.form import MARK, blank_form
-    from catseye.gateways.writers.output import atomic_file, refuse_suffix
-
-    refuse_suffix(path, "--blank")
-    with atomic_file(path, "--blank", MARK) as pieces:
-        pieces.append(blank_form())

@@ -285,7 +285,7 @@ def test_a_table_that_cannot_be_written_leaves_nothing_written(catseye, tmp_path
     out = tmp_path / "out"
     status, said, complained = catseye("acoustic", EXAMPLE / "night.csv", "--out", out, "--write", tmp_path / place)
     assert (status, said) == (1, "")
-    assert f"--write {tmp_path / place}" in complained
+    assert f"table {tmp_path / place}" in complained
     assert [item.name for item in tmp_path.iterdir()] == ["mine.csv"]
 
 

@@ -24,7 +24,7 @@ def test_every_variable_and_every_model_is_named_in_the_figure(usual):
     drawn, told = usual
     ElementTree.fromstring(drawn)  # it is well formed
     for words in (
-        *(variable.label for variable in VARIABLES),
+        *(f"{variable.name} ({variable.unit})" for variable in VARIABLES),
         *(model.label for model in MODELS.values()),
         "u of formula",
         "u with inputs",

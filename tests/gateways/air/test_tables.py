@@ -18,8 +18,8 @@ def sounded():
     """Travel times of a table, and those found in recordings, which have a signal over their noise."""
     acoustic = EXAMPLES / "acoustic"
     return [
-        *reduce_acoustic([acoustic / "night.csv"], None),
-        *reduce_acoustic(sorted(acoustic.glob("evening-*.wav")), acoustic / "evening.toml"),
+        *reduce_acoustic([acoustic / "night.csv"], None).paths,
+        *reduce_acoustic(sorted(acoustic.glob("evening-*.wav")), acoustic / "evening.toml").paths,
     ]
 
 

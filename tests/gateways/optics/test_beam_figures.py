@@ -7,8 +7,9 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.gateways.optics.beam_figures import beam_figure, beam_object, coating_plot, lines, read_beam, write_beam
+from catseye.gateways.optics.beam_figures import beam_figure, beam_object, coating_plot, lines, write_beam
 from catseye.gateways.writers.objects import json_line
+from catseye.reduction.optics.beam import read_beam
 from column_scene import assert_columns
 from repository import ROOT
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from catseye.gateways.air.objects import air_object, air_verdict
 from catseye.gateways.epoch.objects import pose_object, reduction_object
 from catseye.gateways.writers.objects import json_line, json_page
 
@@ -79,17 +78,6 @@ def test_provenance_proves_inputs_and_outputs(written, reduction):
 def test_output_contains_no_local_paths(written, reduction):
     place = str(reduction.campaign.directory.resolve().parent)
     assert not [path.name for path in written.iterdir() if place in path.read_text(encoding="utf-8")]
-
-
-def test_air_object_has_its_state_and_both_uncertainties():
-    from catseye.atmosphere.index.air import air
-
-    state = air(20.0, 933.0, 50.0)
-    told = air_object(state, 0.78, u := state.combined_uncertainty(0.3), verdict=air_verdict(state, u))
-    assert (told["temperature_c"], told["pressure_hpa"], told["humidity_percent"]) == (20.0, 933.0, 50.0)
-    assert told["formula_uncertainty"] == state.standard_uncertainty
-    # the slope as printed, four digits
-    assert told["standard_uncertainty"] == pytest.approx(math.hypot(5e-8, 0.3 * 0.8921e-6), rel=1e-3)
 
 
 def test_benchmarks_are_reported_as_refractometers(reduction):

@@ -19,7 +19,7 @@ from catseye.records.laboratory.baseline import (
     read_observations,
 )
 from catseye.reduction.baseline.instrument import calibrate_baseline, record_values
-from catseye.reduction.baseline.lengths import BaselineSettings
+from catseye.reduction.baseline.settings import BaselineSettings
 from repository import ROOT
 
 DATA = ROOT / "examples" / "baselines" / "busselton"
@@ -132,14 +132,12 @@ def test_ignoring_the_offsets_from_the_line_would_bend_the_short_distances(ts30)
 
 def test_distances_between_pillars_carry_the_covariance_of_both_ends(ts30):
     """By 20 000 draws of the pillars from their covariance: 0.5 %, three of these."""
-    from catseye.gateways.baseline.objects import spans
-
     s = ts30.solution
     rows, covariance = s.places
     draws = np.random.default_rng(9).multivariate_normal(np.concatenate([s.x, s.y])[rows], covariance, 20_000)
     both = np.zeros((20_000, 12))
     both[:, rows] = draws
-    for span in spans(ts30):
+    for span in ts30.spans:
         i, j = ts30.names.index(span.start), ts30.names.index(span.end)
         length = np.hypot(both[:, j] - both[:, i], both[:, 6 + j] - both[:, 6 + i])
         assert span.u == pytest.approx(length.std(), rel=0.016)

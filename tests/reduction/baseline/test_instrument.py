@@ -8,12 +8,13 @@ import pytest
 
 from catseye.atmosphere.index.air import group_refractivity
 from catseye.atmosphere.sound.velocity import EARTH_RADIUS
-from catseye.errors import EstimationError, InputError, ValidityError
+from catseye.errors import ArgumentError, EstimationError, InputError, ValidityError
 from catseye.estimation.baseline.adjustment import BaselineNoise, adjust_baseline
 from catseye.estimation.baseline.model import BaselineSights, Claim
 from catseye.records.laboratory.baseline import FORMAT, Baseline, read_heights, read_observations
 from catseye.reduction.baseline.instrument import calibrate_baseline, record_values
-from catseye.reduction.baseline.lengths import BaselineSettings, horizontal_distance, reduce_lengths
+from catseye.reduction.baseline.lengths import horizontal_distance, reduce_lengths
+from catseye.reduction.baseline.settings import BaselineSettings
 from catseye.reduction.baseline.statistical_tests import suspects_of
 from draws import draws, same_sigmas
 
@@ -313,9 +314,9 @@ def test_tables_that_do_not_join_are_refused_in_one_line(tmp_path, heights):
     (tmp_path / "x.csv").write_text((tmp_path / "o.csv").read_text().replace("\nA,", "\nX,"))
     with pytest.raises(InputError, match=r"pillar 'X' is unknown \(expected one of A, B, C, D, E, F\)"):
         calibrate_baseline(read_observations(tmp_path / "x.csv"), None, best, settings=EXACT)
-    with pytest.raises(InputError, match="reference-height"):
+    with pytest.raises(InputError, match="reference_height_m 100 is not the known"):
         calibrate_baseline(seen, heights(), best, settings=replace(EXACT, reference_height=100.0))
-    with pytest.raises(InputError, match="reference-height-m needs --heights"):
+    with pytest.raises(ArgumentError, match="reference_height_m needs heights"):
         calibrate_baseline(seen, None, settings=replace(EXACT, reference_height=100.0))
     tops = heights()
     tops.height["B"] = 60.0

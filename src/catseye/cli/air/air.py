@@ -28,9 +28,11 @@ def air(  # noqa: PLR0913 - its options are its command line
         float | None, typer.Option("--humidity-percent", help="Relative humidity over liquid water, %; or:")
     ] = None,
     dew_point_c: Annotated[float | None, typer.Option("--dew-point-c", help="dew point of a mirror, °C;")] = None,
-    frost_point_c: Annotated[float | None, typer.Option("--frost-point-c", help="its frost point, °C;")] = None,
+    frost_point_c: Annotated[float | None, typer.Option("--frost-point-c", help="frost point of a mirror, °C;")] = None,
     wet_bulb_c: Annotated[float | None, typer.Option("--wet-bulb-c", help="wet bulb of a psychrometer, °C;")] = None,
-    ice_bulb_c: Annotated[float | None, typer.Option("--ice-bulb-c", help="the same, the bulb frozen, °C;")] = None,
+    ice_bulb_c: Annotated[
+        float | None, typer.Option("--ice-bulb-c", help="wet bulb of a psychrometer, frozen, °C;")
+    ] = None,
     vapour_pressure_hpa: Annotated[
         float | None, typer.Option("--vapour-pressure-hpa", help="partial pressure of the vapour, hPa.")
     ] = None,
@@ -38,7 +40,7 @@ def air(  # noqa: PLR0913 - its options are its command line
         float | None, typer.Option("--barometer-mmhg", help="Mercury as read, mm, instead of --pressure-hpa;")
     ] = None,
     mercury_c: Annotated[float | None, typer.Option("--mercury-c", help="temperature of the mercury, °C;")] = None,
-    gravity: Annotated[float | None, typer.Option("--gravity", help="gravity there, m/s²; or by")] = None,
+    gravity: Annotated[float | None, typer.Option("--gravity", help="gravity at the barometer, m/s²; or")] = None,
     latitude_deg: Annotated[float | None, typer.Option("--latitude-deg", help="latitude, degrees, and")] = None,
     elevation_m: Annotated[float | None, typer.Option("--elevation-m", help="elevation above the sea, m.")] = None,
     above_barometer_m: Annotated[
@@ -48,21 +50,36 @@ def air(  # noqa: PLR0913 - its options are its command line
     model: Model = "ciddor_hill1999",
     co2_ppm: CarbonDioxide = 450.0,
     u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
-    u_pressure_hpa: Annotated[float, typer.Option(help="Of the pressure, hPa.", **U)] = 0.0,
-    u_barometer_mmhg: Annotated[float, typer.Option(help="Of the mercury as read, mm.", **U)] = 0.0,
-    u_mercury_c: Annotated[float, typer.Option(help="Of the mercury's temperature, °C.", **U)] = 0.0,
-    u_humidity_percent: Annotated[float, typer.Option(help="Of the relative humidity, %.", **U)] = 0.0,
-    u_dew_point_c: Annotated[float, typer.Option(help="Of the dew or frost point, °C.", **U)] = 0.0,
-    u_wet_bulb_c: Annotated[float, typer.Option(help="Of the wet bulb, water or ice, °C.", **U)] = 0.0,
-    u_vapour_pressure_hpa: Annotated[float, typer.Option(help="Of the vapour pressure, hPa.", **U)] = 0.0,
-    u_co2_ppm: Annotated[float, typer.Option(help="Of the carbon dioxide, ppm.", **U)] = 0.0,
+    u_pressure_hpa: Annotated[float, typer.Option(help="Standard uncertainty of the pressure, hPa.", **U)] = 0.0,
+    u_barometer_mmhg: Annotated[
+        float, typer.Option(help="Standard uncertainty of the mercury as read, mm.", **U)
+    ] = 0.0,
+    u_mercury_c: Annotated[
+        float, typer.Option(help="Standard uncertainty of the mercury's temperature, °C.", **U)
+    ] = 0.0,
+    u_humidity_percent: Annotated[
+        float, typer.Option(help="Standard uncertainty of the relative humidity, %.", **U)
+    ] = 0.0,
+    u_dew_point_c: Annotated[
+        float, typer.Option(help="Standard uncertainty of the dew or frost point, °C.", **U)
+    ] = 0.0,
+    u_wet_bulb_c: Annotated[
+        float, typer.Option(help="Standard uncertainty of the wet bulb, water or ice, °C.", **U)
+    ] = 0.0,
+    u_vapour_pressure_hpa: Annotated[
+        float, typer.Option(help="Standard uncertainty of the vapour pressure, hPa.", **U)
+    ] = 0.0,
+    u_co2_ppm: Annotated[float, typer.Option(help="Standard uncertainty of the carbon dioxide, ppm.", **U)] = 0.0,
     surface_c: Annotated[
-        float | None, typer.Option("--surface-c", help="A retroreflector's temperature, °C: will it dew or frost over?")
+        float | None,
+        typer.Option("--surface-c", help="Temperature of a retroreflector, °C: will it dew or frost over?"),
     ] = None,
-    u_surface_c: Annotated[float, typer.Option(help="Of the surface's temperature, °C.", **U)] = 0.0,
+    u_surface_c: Annotated[
+        float, typer.Option(help="Standard uncertainty of the surface's temperature, °C.", **U)
+    ] = 0.0,
     json: Json = False,
 ) -> None:
-    """Index of air, its sensitivities and its uncertainty, from whatever instruments stand there."""
+    """Index of air from any instruments, with sensitivities and uncertainty."""
     from catseye.api.weather import air as air_of
 
     result = air_of(

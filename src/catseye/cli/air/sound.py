@@ -32,12 +32,14 @@ def sound(  # noqa: PLR0913 - its options are its command line
     ] = "parker2004",
     co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm; parker2004 has none.")] = 450.0,
     u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
-    u_pressure_hpa: Annotated[float, typer.Option(help="Of the pressure, hPa.", **U)] = 0.0,
-    u_humidity_percent: Annotated[float, typer.Option(help="Of the relative humidity, %.", **U)] = 0.0,
-    u_co2_ppm: Annotated[float, typer.Option(help="Of the carbon dioxide, ppm.", **U)] = 0.0,
+    u_pressure_hpa: Annotated[float, typer.Option(help="Standard uncertainty of the pressure, hPa.", **U)] = 0.0,
+    u_humidity_percent: Annotated[
+        float, typer.Option(help="Standard uncertainty of the relative humidity, %.", **U)
+    ] = 0.0,
+    u_co2_ppm: Annotated[float, typer.Option(help="Standard uncertainty of the carbon dioxide, ppm.", **U)] = 0.0,
     json: Json = False,
 ) -> None:
-    """Speed of sound in air, its sensitivities and its uncertainty, by the notes' formula and today's."""
+    """Speed of sound in air, with sensitivities and uncertainty."""
     from catseye.api.weather import sound as sound_of
 
     result = sound_of(

@@ -17,7 +17,7 @@ def beam(
     file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="The beam's elements, laser to detector.")],
     distance_m: Annotated[
         float | None,
-        typer.Option("--distance-m", help="To the reflector, m; as in FILE if not given."),
+        typer.Option("--distance-m", help="Distance to the reflector, m; as in FILE if not given."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -26,13 +26,11 @@ def beam(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """A laser beam through lenses, mirrors and a retroreflector to the detector: sizes, clipping, power."""
+    """Sizes, clipping and power of a beam, laser to detector."""
     from catseye.api.optics import beam as beam_of
-    from catseye.api.result import save
-    from catseye.gateways.writers.output import refuse_output
+    from catseye.api.result import require_writable, save
 
-    if out is not None:
-        refuse_output(out, file)
+    require_writable(out, file)
     result = beam_of(file, distance_m=distance_m)
     written: tuple[str, ...] = ()
     if out is not None:

@@ -13,7 +13,7 @@ from catseye.cli.results import tell
     "Example: catseye glass fused-silica --wavelength-um 0.85 --temperature-c=-10"
 )
 def glass(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Which glass; without it, all.")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Name of the glass; all without it.")] = None,
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
     temperature_c: Annotated[float, typer.Option("--temperature-c", help="Temperature of the glass, °C.")] = 20.0,
     height_mm: Annotated[
@@ -22,7 +22,7 @@ def glass(
     ] = 38.1,
     json: Json = False,
 ) -> None:
-    """Index of a glass, its slopes, what a prism of it does to a range, and what a wrong glass costs."""
+    """Indices of a glass, a prism of it, and errors of another glass."""
     from catseye.api.optics import glass as glass_of
 
     tell(glass_of(name, wavelength_um=wavelength_um, temperature_c=temperature_c, height_mm=height_mm), json=json)

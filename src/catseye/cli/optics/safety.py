@@ -15,40 +15,43 @@ from catseye.cli.vocabularies import EDITIONS, one_of
     "--scan-rad-per-s 0.5\nA warning for planning, never a certificate: docs/safety.md says what is left out."
 )
 def safety(  # noqa: PLR0913 - its options are its command line
-    power_mw: Annotated[float, typer.Option("--power-mw", help="Of the beam, mW, continuous.")],
-    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="0.4 to 1.4 µm.")],
-    diameter_mm: Annotated[float, typer.Option("--diameter-mm", help="At 1/e² where the beam leaves, mm.")],
-    divergence_mrad: Annotated[float, typer.Option("--divergence-mrad", help="Full angle at 1/e², mrad.")],
+    power_mw: Annotated[float, typer.Option("--power-mw", help="Power of the beam, continuous, mW.")],
+    wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Wavelength in vacuum, 0.4 to 1.4 µm.")],
+    diameter_mm: Annotated[float, typer.Option("--diameter-mm", help="Diameter at 1/e² where the beam leaves, mm.")],
+    divergence_mrad: Annotated[float, typer.Option("--divergence-mrad", help="Divergence, full angle at 1/e², mrad.")],
     waist_distance: Annotated[
-        float, typer.Option("--waist-distance", help="Narrowest place, m from where it leaves.")
+        float, typer.Option("--waist-distance", help="Distance of the waist from where the beam leaves, m.")
     ] = 0.0,
     duration_s: Annotated[
-        float | None, typer.Option("--duration-s", help="Of the exposure; 0.25 s for visible light, else 100 s.")
+        float | None,
+        typer.Option("--duration-s", help="Duration of the exposure; 0.25 s for visible light, else 100 s."),
     ] = None,
     aided: Annotated[
         bool, typer.Option("--aided", help="Sweep, return and near end of the hazard through 7x50 binoculars.")
     ] = False,
     scan_rad_per_s: Annotated[
-        float | None, typer.Option("--scan-rad-per-s", help="The beam (not the mirror) turns so fast.")
+        float | None, typer.Option("--scan-rad-per-s", help="Rate at which the beam (not the mirror) turns, rad/s.")
     ] = None,
     scan_period_s: Annotated[
-        float | None, typer.Option("--scan-period-s", help="From one pass to the next; a single pass if not given.")
+        float | None,
+        typer.Option("--scan-period-s", help="Time from one pass to the next, s; a single pass if not given."),
     ] = None,
     reflector_distance: Annotated[
-        float | None, typer.Option("--reflector-distance", help="Of a retroreflector that sends it back, m.")
+        float | None,
+        typer.Option("--reflector-distance", help="Distance of a retroreflector that sends the beam back, m."),
     ] = None,
     reflector_diameter_mm: Annotated[
-        float, typer.Option("--reflector-diameter-mm", help="Of its clear face, mm.")
+        float, typer.Option("--reflector-diameter-mm", help="Diameter of the retroreflector's clear face, mm.")
     ] = 50.8,
     subtense_mrad: Annotated[
         float, typer.Option("--subtense-mrad", help="Angle of the apparent source where the eye is; up to 1.5 a point.")
     ] = 1.5,
     edition: Annotated[
-        str, typer.Option("--edition", metavar=EDITIONS, callback=one_of(EDITIONS), help="Of the limits.")
+        str, typer.Option("--edition", metavar=EDITIONS, callback=one_of(EDITIONS), help="Edition of the limits.")
     ] = "iec2014",
     json: Json = False,
 ) -> None:
-    """Laser safety of a beam: limits of exposure, class with reasons, hazard distances."""
+    """Laser safety of a beam: limits of exposure, class, hazard distances."""
     from catseye.api.optics import safety as safety_of
 
     result = safety_of(

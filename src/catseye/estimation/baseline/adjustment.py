@@ -16,7 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.errors import EstimationError
-from catseye.estimation.baseline.model import BaselineModel, BaselineSights, Claim, Extra, KnownPlaces, Normal
+from catseye.estimation.baseline.model import (
+    BaselineModel,
+    BaselineSights,
+    Claim,
+    Extra,
+    KnownPlaces,
+    Normal,
+    pillar_label,
+)
 
 FLOOR = np.array([1e-7, 1e-7, 1e-9]) ** 2  # m², m², ratio²: no distance meter is better
 CEILING = np.array([0.1, 0.1, 1e-3]) ** 2
@@ -184,7 +192,7 @@ def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.nda
 
     def criterion(theta):
         values = all_of(theta)
-        normal = Normal(y, a, model.variance(Claim(*values)), model.names)
+        normal = Normal(y, a, model.variance(Claim(*values)), model.labels)
         py = (normal.p @ y)[:m]
         diagonal = np.diag(normal.p)[:m]
         total = normal.log_v + normal.log_n + float(y @ normal.p @ y)
@@ -195,7 +203,7 @@ def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.nda
         return total, (slope * values)[active]
 
     shot = squares / repeats if repeats else 0.0
-    spread = float(np.var(Normal(y, a, model.variance(Claim(shot, 1e-7, 1e-12)), model.names).y[:m])) + 1e-12
+    spread = float(np.var(Normal(y, a, model.variance(Claim(shot, 1e-7, 1e-12)), model.labels).y[:m])) + 1e-12
     begin = np.log(np.clip([max(shot, 1e-12), spread, 1e-12], FLOOR, CEILING))[active]
     bounds = list(zip(low[active], high[active], strict=True))
     tries = [begin, begin + np.log([0.1, 10.0])[[0] * (len(begin) - 1) + [1]]]
@@ -207,7 +215,7 @@ def _components(model: BaselineModel, values: np.ndarray) -> tuple[Claim, np.nda
 def _component_covariance(model, y, a, components, active, repeats):
     """Covariance from the expected information, half the trace of P Q P Q."""
     m = len(model.distance)
-    normal = Normal(y, a, model.variance(Claim(*components)), model.names)
+    normal = Normal(y, a, model.variance(Claim(*components)), model.labels)
     cofactors = model.cofactors()
     information = 0.5 * cofactors @ normal.p[:m, :m] ** 2 @ cofactors.T
     if repeats:
@@ -304,12 +312,15 @@ def separation(
     return model.step(np.zeros(len(model.names)), solution.noise)[1].separation
 
 
-def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count: int) -> np.ndarray:
+def places_in_line(
+    start: Sequence[int], end: Sequence[int], distance, *, count: int, names: Sequence[str] = ()
+) -> np.ndarray:
     """Approximate positions (count,) m of pillars along a line, from distances between them.
 
     start, end   (m,) numbers of pillars
     distance     (m,) m
     count        number of pillars
+    names        of the pillars by number, for messages; empty: numbers
 
     The lower number is on the left. Raises EstimationError for a pillar whose side the distances do not determine.
 
@@ -323,7 +334,9 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count:
     for p in range(count):
         ties = sum((p, q) in length for q in range(count))
         if ties < 2 < count:
-            raise EstimationError(f"pillar number {p} has {ties} distances to the others: measure it to at least two")
+            raise EstimationError(
+                f"{pillar_label(p, names)} has {ties} distances to the others: measure it to at least two"
+            )
     (low, high), longest = max(length.items(), key=lambda item: (item[1], -item[0][0]))
     low, high = min(low, high), max(low, high)
     orders = [(0.0, {low: 0.0, high: longest})]
@@ -331,7 +344,8 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count:
         tied = {p: [(q, length[(p, q)]) for q in placed if (p, q) in length] for p in range(count) if p not in placed}
         pillar = max(tied, key=lambda p: len(tied[p]))
         if not tied[pillar]:
-            raise EstimationError(f"no distance joins pillar number {pillar} to pillar number {low}: measure one")
+            ends = f"{pillar_label(pillar, names)} to {pillar_label(low, names)}"
+            raise EstimationError(f"no distance joins {ends}: measure one")
         longer = []
         for misfit, place in orders:
             guesses: list[float] = []
@@ -345,6 +359,6 @@ def places_in_line(start: Sequence[int], end: Sequence[int], distance, *, count:
     if len(orders) > 1 and orders[1][0] < orders[0][0] + NEARLY:
         side = next(p for p in range(count) if abs(orders[1][1][p] - orders[0][1][p]) > NEARLY)
         raise EstimationError(
-            f"the distances do not determine on which side pillar number {side} is: measure more pairs"
+            f"the distances do not determine on which side {pillar_label(side, names)} is: measure more pairs"
         )
     return np.array([orders[0][1][p] for p in range(count)])

@@ -90,7 +90,7 @@ def full_test(start, end, distance, *, order, sigma=None) -> FullTest:
     x = np.zeros(len(order))
     x[np.asarray(order)] = np.concatenate([[0.0], values[:-1]])
     u_zero = s * float(np.linalg.norm(inverse[-1]))
-    return FullTest(x, float(values[-1]), u_zero, s, freedom, residual)
+    return FullTest(x=x, zero=float(values[-1]), u_zero=u_zero, s=s, degrees_of_freedom=freedom, residual=residual)
 
 
 def within_claim(variance_factor: float, degrees_of_freedom: int, level: float = 0.05) -> Outcome:

@@ -3,6 +3,7 @@
 The effects are described in `adjustment`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -27,6 +28,7 @@ class BaselineSights:
     effects       (q,) their names
     direction     (m,) horizontal circle reading, clockwise, rad; nan if none
     u_direction   (m,) rad, of the recorded reading
+    pillars       names of the pillars by number, for messages; empty: numbers
     """
 
     start: np.ndarray
@@ -39,6 +41,7 @@ class BaselineSights:
     effects: tuple[str, ...]
     direction: np.ndarray
     u_direction: np.ndarray
+    pillars: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.distance)
@@ -122,6 +125,25 @@ class Claim:
     air: float
 
 
+def pillar_label(number: int, names: Sequence[str]) -> str:
+    """Pillar in a message: its name, or its number without names.
+
+    >>> pillar_label(1, ["A", "B"]), pillar_label(1, ())
+    ('pillar B', 'pillar number 1')
+    """
+    return f"pillar {names[number]}" if names else f"pillar number {number}"
+
+
+def place_label(row: int, count: int, names: Sequence[str]) -> str:
+    """Coordinate in a message, by its index in [x, y].
+
+    >>> place_label(1, 2, ["A", "B"]), place_label(2, 2, ())
+    ('x of B', 'y 0')
+    """
+    axis, number = ("x", row) if row < count else ("y", row - count)
+    return f"{axis} of {names[number]}" if names else f"{axis} {number}"
+
+
 class BaselineModel:
     """Linear model at given values: set means, directions, prior positions."""
 
@@ -144,7 +166,7 @@ class BaselineModel:
         else:
             missing = np.flatnonzero(~touched)
             if len(missing):
-                raise EstimationError(f"pillar number {missing[0]} has no distance")
+                raise EstimationError(f"{pillar_label(missing[0], sights.pillars)} has no distance")
             across = n + along[1:-1] if len(self.aimed) else np.empty(0, int)
             self.free = np.concatenate([along[1:], across])
         self.lengths = len(self.free)
@@ -156,6 +178,7 @@ class BaselineModel:
             *(extra.names if extra is not None else ()),
             *(f"orientation {k}" for k in aimed_setups),
         )
+        self.labels = (*(place_label(i, n, sights.pillars) for i in self.free), *self.names[self.lengths :])
         self.orientation = {int(k): len(self.names) - len(aimed_setups) + i for i, k in enumerate(aimed_setups)}
         unknown = 1 + int(scale) + (len(extra.names) if extra is not None else 0)
         self.freedom_sets = len(self.distance) - unknown - (0 if known is not None else n - 1)
@@ -253,21 +276,21 @@ class BaselineModel:
     def step(self, values, noise: Claim):
         """Next step and its normal equations."""
         y, a = self.rows(values)
-        normal = Normal(y, a, self.variance(noise), self.names)
+        normal = Normal(y, a, self.variance(noise), self.labels)
         return normal.values, normal
 
 
 class Normal:
     """Generalised least squares of dense rows: values, covariance, and the projector P."""
 
-    def __init__(self, y, a, v, names):
+    def __init__(self, y, a, v, labels):
         root = np.linalg.cholesky(v)
         white, target = np.linalg.solve(root, a), np.linalg.solve(root, y)
         length = np.linalg.norm(white, axis=0)
         length = np.where(length > 0.0, length, 1.0)
         u, size, vt = np.linalg.svd(white / length, full_matrices=False)
-        if len(y) < len(names) or size[-1] < LEAST_SEPARATION:
-            weak = ", ".join(names[i] for i in np.flatnonzero(np.abs(vt[-1]) > 0.2)[:6])
+        if len(y) < len(labels) or size[-1] < LEAST_SEPARATION:
+            weak = ", ".join(labels[i] for i in np.flatnonzero(np.abs(vt[-1]) > 0.2)[:6])
             raise EstimationError(
                 f"the distances do not determine {weak}: measure more pairs, parts of the line and its full length"
             )

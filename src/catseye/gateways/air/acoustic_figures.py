@@ -5,26 +5,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled, svgs
 
 if TYPE_CHECKING:
-    from catseye.reduction.air.acoustic_recording import AcousticPath, ChannelTrace
+    from catseye.reduction.air.sound_path import AcousticPath, ChannelTrace
 
 DIRECTIONS = {"ab": "towards the target", "ba": "towards the ranger", "loop": "loop-back"}
 
 
+def acoustic_drawings(path: "AcousticPath") -> dict[str, Figure]:
+    """Figures of one path, by name."""
+    with styled():
+        drawn: dict[str, Figure] = {}
+        if path.shots.traces:
+            drawn["recording"] = _recording(path.shots.traces)
+            drawn["correlation"] = _correlation(path.shots.traces)
+        if path.used.any():
+            drawn["temperature"] = _in_time(path)
+        return drawn
+
+
 def acoustic_figures(path: "AcousticPath") -> dict[str, str]:
     """SVG text of each figure of one path, by name."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)
-        drawn: dict[str, str] = {}
-        if path.shots.traces:
-            drawn["recording"] = svg(_recording(path.shots.traces))
-            drawn["correlation"] = svg(_correlation(path.shots.traces))
-        if path.used.any():
-            drawn["temperature"] = svg(_in_time(path))
-        return drawn
+    return svgs(acoustic_drawings(path))
 
 
 def _recording(traces: Sequence["ChannelTrace"]) -> Figure:

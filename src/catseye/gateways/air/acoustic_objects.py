@@ -1,90 +1,35 @@
 """Acoustic paths as JSON, tables and text."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import PPM
-from catseye.gateways.writers.verdict import Verdict
-from catseye.records.site.validity import expired
+from catseye.gateways.writers.passage import Passage
 
 if TYPE_CHECKING:
-    from catseye.reduction.air.acoustic_recording import AcousticPath
-
-MOST_USED = 0.8  # least share of a path's shots for a good verdict
+    from catseye.reduction.air.sound_path import AcousticPath, AcousticReduction
 
 
-class Mean(NamedTuple):
-    """Mean temperature (°C), wind (m/s) and refractivity of a path, with uncertainties."""
-
-    used: int
-    temperature_c: float
-    u_temperature_c: float
-    wind: float
-    refractivity: float
-    u_refractivity: float
-
-
-def mean(path: "AcousticPath") -> Mean:
-    """Means over the used shots, with the full covariance: common errors do not average out."""
-    used, air = path.used, path.temperatures
-    count = int(used.sum())
-    if count == 0:
-        return Mean(0, *(np.nan,) * 5)
-    block = np.ix_(used, used)
-    return Mean(
-        count,
-        float(air.temperature_c[used].mean()),
-        float(np.sqrt(air.covariance_c2[block].sum())) / count,
-        float(air.wind[used].mean()),
-        float(air.group_refractivity[used].mean()),
-        float(np.sqrt(air.covariance_group[block].sum())) / count,
-    )
-
-
-def acoustic_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
-    """Verdict on acoustic paths: temperatures, share of used shots, validity of the sheets."""
-    doubts: list[str] = []
-    for path in paths:
-        doubts += expired({f"{path.sheet.ranger} to {path.sheet.target}": path.sheet}, float(path.shots.mjd[-1]))
-        doubts += humidity_doubts(path.shots.weather[2])
-    return _own_verdict(paths).hearing(doubts)
-
-
-def _own_verdict(paths: Sequence["AcousticPath"]) -> Verdict:
-    unusable = [path for path in paths if not path.used.any()]
-    if unusable and len(unusable) == len(paths):
-        return Verdict("failed", "no usable shot of any path")
-    if unusable:
-        return Verdict("doubtful", f"no usable shot of {unusable[0].sheet.ranger} to {unusable[0].sheet.target}")
-    thin = [path for path in paths if path.used.mean() < MOST_USED]
-    if thin:
-        share = 100.0 * float(thin[0].used.mean())
-        return Verdict("doubtful", f"only {share:.0f} % of the shots of {thin[0].sheet.ranger} could be used")
-    return Verdict("good", f"{sum(int(path.used.sum()) for path in paths)} shots used of {len(paths)} paths")
-
-
-def acoustic_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
+def acoustic_object(reduction: "AcousticReduction") -> dict[str, Any]:
     """Object that `catseye acoustic --json` prints."""
-    return {"verdict": acoustic_verdict(paths).to_object(), "paths": [_path(path) for path in paths]}
+    return {"verdict": reduction.verdict.to_object(), "paths": [_path(path) for path in reduction.paths]}
 
 
-def full_object(paths: Sequence["AcousticPath"]) -> dict[str, Any]:
+def full_object(reduction: "AcousticReduction") -> dict[str, Any]:
     """The same with covariances, as in acoustic.json."""
     items = []
-    for path in paths:
+    for path in reduction.paths:
         covariances = {
             "covariance_c2": path.temperatures.covariance_c2,
             "covariance_group": path.temperatures.covariance_group,
         }
         items.append({**_path(path), **covariances})
-    return {"format": "catseye-acoustic-1", "verdict": acoustic_verdict(paths).to_object(), "paths": items}
+    return {"format": "catseye-acoustic-1", "verdict": reduction.verdict.to_object(), "paths": items}
 
 
 def _path(path: "AcousticPath") -> dict[str, Any]:
-    sheet, air, over = path.sheet, path.temperatures, mean(path)
+    sheet, air, over = path.sheet, path.temperatures, path.mean
     return {
         "ranger": sheet.ranger,
         "target": sheet.target,
@@ -125,9 +70,14 @@ def _shot(path: "AcousticPath", k: int) -> dict[str, Any]:
     }
 
 
+def passages(reduction: "AcousticReduction") -> list[Passage]:
+    """Passages on all paths, in order."""
+    return [Passage(title, text) for path in reduction.paths for title, text in words(path)]
+
+
 def words(path: "AcousticPath") -> list[tuple[str, str]]:
     """Title and text of each passage on a path."""
-    sheet, over = path.sheet, mean(path)
+    sheet, over = path.sheet, path.mean
     total = len(path.shots.mjd)
     ends = f"{sheet.ranger} to {sheet.target}, {sheet.length_m:.3f} m"
     if over.used == 0:

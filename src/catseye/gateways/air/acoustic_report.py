@@ -1,6 +1,6 @@
 """Files of acoustic paths: tables, JSON and one HTML report."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from html import escape
 from pathlib import Path
@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import PPM
 from catseye.gateways.air.acoustic_figures import acoustic_figures
 from catseye.gateways.air.acoustic_objects import (
-    acoustic_verdict,
     full_object,
-    mean,
     words,
 )
 from catseye.gateways.air.tables import path_temperatures_csv, shots_csv
@@ -23,7 +22,7 @@ from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 
 if TYPE_CHECKING:
-    from catseye.reduction.air.acoustic_recording import AcousticPath
+    from catseye.reduction.air.sound_path import AcousticPath, AcousticReduction
 
 FORMAT = "catseye-acoustic-1"
 CAPTIONS = {
@@ -35,26 +34,28 @@ CAPTIONS = {
 }
 
 
-def write_acoustic(paths: Sequence["AcousticPath"], directory: Path) -> None:
+def write_acoustic(reduction: "AcousticReduction", directory: Path, progress: Progress | None = None) -> None:
     """Write tables, JSON, report, and the provenance with their hashes.
 
-    paths       as reduced
+    reduction   paths as reduced
     directory   existing, from `writers.output.atomic_directory`
+    progress    called for each file
     """
-    when = datetime.now(UTC)
+    when, paths = datetime.now(UTC), reduction.paths
     files: Files = {
         "path_temperatures.csv": lambda: path_temperatures_csv(paths),
         "shots.csv": lambda: shots_csv(paths),
-        "acoustic.json": lambda: json_page(full_object(paths)),
-        "report.html": lambda: acoustic_report(paths, when),
+        "acoustic.json": lambda: json_page(full_object(reduction)),
+        "report.html": lambda: acoustic_report(reduction, when),
     }
     settings = {"model": paths[0].model, "air_model": paths[0].air_model}
     provenance = {"format": FORMAT, "made_by": "catseye acoustic", "settings": settings}
-    write_files(files, directory, {**provenance, **origin(when, _inputs(paths))})
+    write_files(files, directory, {**provenance, **origin(when, reduction.inputs)}, progress=progress)
 
 
-def acoustic_report(paths: Sequence["AcousticPath"], when: datetime) -> str:
+def acoustic_report(reduction: "AcousticReduction", when: datetime) -> str:
     """HTML report; `when` is UTC."""
+    paths = reduction.paths
     names = [f"{path.sheet.ranger} to {path.sheet.target}" for path in paths]
     links = "".join(f'<a href="#path-{i}">{escape(name)}</a>' for i, name in enumerate(names))
     header = (
@@ -63,15 +64,15 @@ def acoustic_report(paths: Sequence["AcousticPath"], when: datetime) -> str:
     )
     body = [
         header,
-        verdict_line(acoustic_verdict(paths)),
+        verdict_line(reduction.verdict),
         *(_section(i, path) for i, path in enumerate(paths)),
-        _provenance(_inputs(paths), when),
+        _provenance(reduction.inputs, when),
     ]
     return page("catseye: temperature by sound", "\n".join(body))
 
 
 def _section(number: int, path: "AcousticPath") -> str:
-    sheet, over = path.sheet, mean(path)
+    sheet, over = path.sheet, path.mean
     cards = [
         card("Temperature", f"{over.temperature_c:.3f} °C", f"u = {over.u_temperature_c:.3f} °C"),
         card("Wind", f"{over.wind:+.2f} m/s", f"from {sheet.ranger} to {sheet.target}"),
@@ -116,16 +117,6 @@ def _shots(path: "AcousticPath") -> str:
     ]  # fmt: skip
     columns = ("MJD", "file", "A to B (ms)", "B to A (ms)", "°C", "u (°C)", "wind (m/s)", "n_g - 1 (ppm)", "status")
     return table(columns, rows, "ntnnnnnnw")
-
-
-def _inputs(paths: Sequence["AcousticPath"]) -> dict[str, str]:
-    """SHA-256 by file; equal file names get their path's name as a prefix."""
-    digests: dict[str, str] = {}
-    for path in paths:
-        for name, digest in path.hashes.items():
-            double = digests.get(name, digest) != digest
-            digests[f"{path.sheet.ranger} to {path.sheet.target}/{name}" if double else name] = digest
-    return digests
 
 
 def _provenance(inputs: Mapping[str, str], when: datetime) -> str:

@@ -40,13 +40,15 @@ class Variable:
     """Variable of the figure.
 
     key      argument name of the model
-    label    axis label
+    name     on the axis
+    unit     of the axis
     around   half the width drawn around the state; None for `ends`
     ends     fixed ends, extended to include the state
     """
 
     key: str
-    label: str
+    name: str
+    unit: str
     around: float | None
     ends: tuple[float, float] = (0.0, 0.0)
 
@@ -58,11 +60,11 @@ class Variable:
 
 
 VARIABLES = (
-    Variable("temperature_c", "temperature (°C)", 15.0),
-    Variable("pressure_hpa", "pressure (hPa)", 50.0),
-    Variable("humidity_percent", "relative humidity (%)", None, (0.0, 100.0)),
-    Variable("wavelength_um", "wavelength (µm)", None, (0.4, 1.6)),
-    Variable("co2_ppm", "carbon dioxide (ppm)", None, (300.0, 1000.0)),
+    Variable("temperature_c", "temperature", "°C", 15.0),
+    Variable("pressure_hpa", "pressure", "hPa", 50.0),
+    Variable("humidity_percent", "relative humidity", "%", None, (0.0, 100.0)),
+    Variable("wavelength_um", "wavelength", "µm", None, (0.4, 1.6)),
+    Variable("co2_ppm", "carbon dioxide", "ppm", None, (300.0, 1000.0)),
 )
 
 
@@ -183,14 +185,14 @@ def _draw(above, below, variable: Variable, state: dict[str, float], model: str,
             refractivity[inside] = air(**valid, model=name).group_refractivity / PPM
             below.plot(x, refractivity - index, color=COLOURS[name], lw=1.2, label=MODELS[name].label)
             drawn.add(name)
-    below.set_xlabel(variable.label)
+    below.set_xlabel(f"{variable.name} ({variable.unit})")
     return drawn
 
 
 def _slope(variable: Variable, state: dict[str, float], model: str) -> str:
     if variable.key == "co2_ppm" and not MODELS[model].co2_slope:
         return f"fixed at {MODELS[model].co2_ppm:.0f} ppm in this model"
-    unit = variable.label.split("(")[1].rstrip(")")
+    unit = variable.unit
     slope = float(getattr(air(**state, model=model).sensitivity, variable.key)) / PPM
     if variable.key == "co2_ppm":  # per 100 ppm: the effect of 1 ppm is too small to read
         slope, unit = 100.0 * slope, f"100 {unit}"

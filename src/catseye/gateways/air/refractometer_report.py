@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import PPM, TWO_PI
 from catseye.gateways.air.tables import series_csv
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict, verdict_line
+from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
-from catseye.records.site.validity import expired
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS
 from catseye.signal.cycles.whole import CycleStatus
@@ -30,31 +28,12 @@ if TYPE_CHECKING:
 FORMAT = "catseye-refractometer-1"
 
 
-def refractometer_verdict(calibration: "PathCalibration") -> Verdict:
-    """Verdict on scatter against the claim, slope of the phase, and validity of the sheet."""
-    readings = calibration.readings
-    doubts = expired({"the path": readings.sheet}, readings.mjd_utc[-1]) + humidity_doubts(readings.humidity_percent)
-    return _own_verdict(calibration).hearing(doubts)
-
-
-def _own_verdict(calibration: "PathCalibration") -> Verdict:
-    if not calibration.slope.agrees:
-        ratio = calibration.slope.ratio
-        return Verdict("doubtful", f"the slope of phase against the weather's index is {ratio:.3f} of theory, not 1")
-    factor, degrees = calibration.variance_factor, calibration.degrees_of_freedom
-    if not degrees >= 1.0:
-        return Verdict("doubtful", "the calibration has no redundancy to check it")
-    if factor > 1.0 + 3.0 * (2.0 / degrees) ** 0.5:
-        return Verdict("doubtful", f"phases and weather scatter more than claimed (variance factor {factor:.2f})")
-    return Verdict("good", f"phases and weather agree as claimed (variance factor {factor:.2f})")
-
-
 def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
     """Object that `catseye refractometer --json` prints."""
-    sheet, readings, parameters = calibration.readings.sheet, calibration.readings, _parameters(calibration)
+    sheet, readings = calibration.readings.sheet, calibration.readings
     counts = Counter(calibration.status)
     return {
-        "verdict": refractometer_verdict(calibration).to_object(),
+        "verdict": calibration.verdict.to_object(),
         "path": sheet.path,
         "path_length": sheet.path_length_m,
         "modulation_hz": sheet.modulation_hz,
@@ -72,8 +51,8 @@ def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
         "phase_per_index": float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz)),
         "budget": calibration.budget,
         "slope": {"ratio": calibration.slope.ratio, "u_ratio": calibration.slope.u, "agrees": calibration.slope.agrees},
-        "thermometers": {n: {"offset_c": v, "u_offset_c": u} for n, (v, u) in parameters["thermometers"].items()},
-        "drift": [{"hours": h, "phase": v, "u_phase": u} for h, v, u in parameters["drift"]],
+        "thermometers": {n: {"offset_c": v, "u_offset_c": u} for n, (v, u) in calibration.thermometers.items()},
+        "drift": [{"hours": h, "phase": v, "u_phase": u} for h, v, u in calibration.drift],
         "noise": {
             "thermometers_over_claimed": calibration.thermometer_scatter,
             "places_over_claimed": calibration.places,
@@ -121,14 +100,6 @@ def _sections(calibration: "PathCalibration") -> list[dict[str, Any]]:
         }
         for k, s in enumerate(calibration.followed.sections)
     ]
-
-
-def _parameters(calibration: "PathCalibration") -> dict[str, Any]:
-    drift = [name for name in calibration.names if name.startswith("drift at ")]
-    return {
-        "thermometers": {name: calibration.of(name) for name in calibration.readings.thermometers},
-        "drift": [(float(name.split()[2]), *calibration.of(name)) for name in drift],
-    }
 
 
 def passages(calibration: "PathCalibration") -> list[Passage]:
@@ -267,7 +238,6 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
     """HTML report; `when` is UTC."""
     drawn, sheet = _svgs(calibration), calibration.readings.sheet
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(calibration))
-    parameters = _parameters(calibration)["thermometers"]
     cards = [
         card(
             "n_g − 1",
@@ -279,12 +249,12 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
             "Readings", f"{calibration.status.count('good')} of {len(calibration.readings)}", "used in the calibration"
         ),
     ]
-    thermometers = [(n, f"{v:+.3f}", f"{u:.3f}") for n, (v, u) in parameters.items()]
+    thermometers = [(n, f"{v:+.3f}", f"{u:.3f}") for n, (v, u) in calibration.thermometers.items()]
     facts = [*versions().items(), *((k, str(v)) for k, v in sheet.model_dump(exclude_none=True).items())]
     body = [
         f"<header><h1>{escape(sheet.path)}: refractometer</h1><div class='faint'>calibrated by catseye on "
         f"{when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>",
-        verdict_line(refractometer_verdict(calibration)),
+        verdict_line(calibration.verdict),
         section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
         section(
             "night",

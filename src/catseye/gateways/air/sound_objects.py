@@ -1,90 +1,53 @@
 """Speed of sound as JSON and text, with other models."""
 
-from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from catseye.atmosphere.sound import parker2004 as sound_parker2004
-from catseye.atmosphere.sound.dispersion import dispersion
-from catseye.atmosphere.sound.speed import MODELS, Sound, sound
-from catseye.atmosphere.weather.humidity import humidity_doubts
+from catseye.atmosphere.sound.speed import MODELS, Sound
 from catseye.errors import ValidityError
-from catseye.gateways.air.objects import WEATHER as SENSED
-from catseye.gateways.air.objects import spread, uncertainty_words
+from catseye.gateways.air.objects import spread
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict
 
-Weather = tuple[Any, Any, Any]
-FREQUENCIES_HZ = (1e3, 10e3)  # range of loudspeakers
+if TYPE_CHECKING:
+    from catseye.reduction.air.sound_speed import SoundSpeed
 
 
-def sound_object(
-    state: Sound, weather: Weather, co2_ppm: Any, *, u: Any, stated: Sequence[str] | None = None
-) -> dict[str, Any]:
-    """Object that `catseye sound --json` prints.
-
-    weather   temperature °C, pressure hPa, relative humidity %, numbers or arrays
-    u         standard uncertainty of the speed, formula and inputs, m/s
-    stated    inputs whose uncertainty it includes, from `stated_inputs`
-    """
+def sound_object(found: "SoundSpeed") -> dict[str, Any]:
+    """Object that `catseye sound --json` prints."""
+    state = found.state
     slopes = state.sensitivity._asdict()
     if not MODELS[state.model].has_co2:
         del slopes["co2_ppm"]
-    t, p, h = weather
     return {
-        "verdict": sound_verdict(state, h, u, stated).to_object(),
+        "verdict": found.verdict.to_object(),
         "model": state.model,
-        "temperature_c": t,
-        "pressure_hpa": p,
-        "humidity_percent": h,
-        "co2_ppm": co2_ppm if MODELS[state.model].has_co2 else None,
+        "temperature_c": found.temperature_c,
+        "pressure_hpa": found.pressure_hpa,
+        "humidity_percent": found.humidity_percent,
+        "co2_ppm": found.co2_ppm if MODELS[state.model].has_co2 else None,
         "speed": state.speed,
         "dry_speed": state.dry_speed,
         "vapour_pressure_hpa": state.vapour_pressure_hpa,
         "sensitivity": slopes,
         "travel_time_per_m": state.travel_time_per_m,
         "travel_time_per_m_per_c": state.time_sensitivity.temperature_c,
-        "standard_uncertainty": u,
+        "standard_uncertainty": found.u,
         "formula_uncertainty": state.standard_uncertainty,
-        "uncertainty_of": None if stated is None else list(stated),
-        "models": {name: _speed_by(name, weather, co2_ppm) for name in MODELS},
-        "notes_gamma_w": gamma_water_cost(state, weather),
-        "dispersion": [_dispersed(state, weather, frequency) for frequency in FREQUENCIES_HZ],
+        "uncertainty_of": list(found.stated),
+        "models": {name: _speed(each) for name, each in found.by_formula.items()},
+        "notes_gamma_w": found.misprint._asdict(),
+        "dispersion": [excess._asdict() for excess in found.dispersion],
     }
 
 
-def gamma_water_cost(state: Sound, weather: Weather) -> dict[str, Any]:
-    """Effect of the misprinted ratio of specific heats of water in the notes, at this weather."""
-    t, p, _ = weather
-    printed = sound_parker2004.speed(t, p, state.vapour_pressure_hpa)
-    right = sound_parker2004.speed(t, p, state.vapour_pressure_hpa, gamma_water=sound_parker2004.GAMMA_VAPOUR)
-    per_c = sound_parker2004.partials(t, p, state.vapour_pressure_hpa).temperature_c
-    return {
-        "printed": sound_parker2004.GAMMA_WATER,
-        "right": sound_parker2004.GAMMA_VAPOUR,
-        "slow_by": right - printed,
-        "temperature_read_high_by_c": (right - printed) / per_c,
-    }
+def _speed(state: Sound | ValidityError) -> dict[str, Any]:
+    if isinstance(state, ValidityError):
+        return {"speed": None, "standard_uncertainty": None, "reason": str(state)}
+    return {"speed": state.speed, "standard_uncertainty": state.standard_uncertainty}
 
 
-def sound_verdict(state: Sound, humidity_percent: Any, u: Any, stated: Sequence[str] | None = None) -> Verdict:
-    """Verdict on the speed: formula limits, humidity, contributions its u includes.
-
-    u        standard uncertainty of the speed, m/s
-    stated   inputs whose uncertainty it includes, from `stated_inputs`; None: all if it exceeds the formula's
-    """
-    if stated is None:
-        stated = SENSED if np.any(np.asarray(u) > np.asarray(state.standard_uncertainty) * (1.0 + 1e-12)) else ()
-    verdict = Verdict("good", f"within the limits of {state.model}; {uncertainty_words(stated)}")
-    return verdict.hearing(humidity_doubts(humidity_percent))
-
-
-def sound_passages(answer: dict[str, Any]) -> list[Passage]:
-    """Speed, slopes and other formulas as text; for many states, the range of values.
-
-    answer   from `sound_object`
-    """
+def sound_passages(found: "SoundSpeed") -> list[Passage]:
+    """Speed, slopes and other formulas as text; for many states, the range of values."""
+    answer = sound_object(found)
     slope, cost, low = answer["sensitivity"], answer["notes_gamma_w"], answer["dispersion"][0]
     carbon = (
         f"{spread(slope['co2_ppm'], '+.5f', 100.0)} m/s per 100 ppm of carbon dioxide"
@@ -117,20 +80,3 @@ def sound_passages(answer: dict[str, Any]) -> list[Passage]:
         "dispersion": f"at {low['frequency_hz']:g} Hz faster by {spread(low['phase_excess'], '.3f')} m/s",
     }
     return [Passage(title, text) for title, text in rows.items()]
-
-
-def _speed_by(name: str, weather: Weather, co2_ppm: Any) -> dict[str, Any]:
-    try:
-        state = sound(*weather, model=name, co2_ppm=co2_ppm)
-    except ValidityError as problem:
-        return {"speed": None, "standard_uncertainty": None, "reason": str(problem)}
-    return {"speed": state.speed, "standard_uncertainty": state.standard_uncertainty}
-
-
-def _dispersed(state: Sound, weather: Weather, frequency: float) -> dict[str, Any]:
-    share = dispersion(weather[0], weather[1], state.vapour_pressure_hpa, frequency_hz=frequency)
-    return {
-        "frequency_hz": frequency,
-        "phase_excess": share.phase * state.speed,
-        "group_excess": share.group * state.speed,
-    }

@@ -9,8 +9,8 @@ from catseye.constants import PPM
 from catseye.gateways.writers.columns import Column, Table, each
 
 if TYPE_CHECKING:
-    from catseye.reduction.air.acoustic_recording import AcousticPath
     from catseye.reduction.air.refractometer_calibration import PathCalibration
+    from catseye.reduction.air.sound_path import AcousticPath
 
 PAGE = "acoustic.md"
 

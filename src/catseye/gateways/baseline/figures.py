@@ -5,11 +5,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
-from catseye.gateways.baseline.tables import shot_residuals
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, styled
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline.instrument import BaselineCalibration
+    from catseye.reduction.baseline.result import BaselineCalibration
 
 MARKERS = "osD^vP"
 
@@ -58,7 +57,7 @@ def _line(calibration: "BaselineCalibration") -> Figure:
 
 def _residuals(calibration: "BaselineCalibration") -> Figure:
     shots, distance = calibration.observations, calibration.lengths.distance
-    residual = shot_residuals(calibration) / MILLIMETRE
+    residual = calibration.shot_residuals / MILLIMETRE
     figure = Figure(figsize=(9.4, 4.3), layout="constrained")
     ax = figure.add_subplot()
     far = np.linspace(0.0, 1.03 * float(distance.max()), 101)
@@ -84,7 +83,7 @@ def _weather(calibration: "BaselineCalibration") -> Figure:
     A slope shows that the light does not follow the sensors' index.
     """
     shots, lengths = calibration.observations, calibration.lengths
-    residual = shot_residuals(calibration) / lengths.distance / PPM
+    residual = calibration.shot_residuals / lengths.distance / PPM
     change = -(lengths.index - lengths.index[calibration.keep].mean()) / PPM
     long = lengths.distance > 0.25 * lengths.distance.max()
     figure = Figure(figsize=(9.4, 4.0), layout="constrained")
@@ -136,7 +135,7 @@ def _cyclic(calibration: "BaselineCalibration") -> Figure:
     figure = Figure(figsize=(9.4, 3.6), layout="constrained")
     ax = figure.add_subplot()
     ax.plot(angle * unit, curve(angle) / MILLIMETRE, color=INK, lw=1.2, label="adjusted")
-    values = (shot_residuals(calibration) + curve(share)) / MILLIMETRE
+    values = (calibration.shot_residuals + curve(share)) / MILLIMETRE
     for k, label, colour, marker in _setups(calibration):
         mine = shots.setup == k
         ax.scatter(share[mine] * unit, values[mine], s=18, c=colour, marker=marker, lw=0, alpha=0.75, label=label)

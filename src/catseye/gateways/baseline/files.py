@@ -10,13 +10,12 @@ from catseye.aliases import Progress
 from catseye.gateways.baseline.objects import baseline_object
 from catseye.gateways.baseline.tables import distances_csv, observations_csv, pillars_csv
 from catseye.gateways.writers.objects import json_page
-from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.laboratory.baseline import FORMAT, Baseline, baseline_text
 from catseye.reduction.baseline.instrument import record_values
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline.instrument import BaselineCalibration
+    from catseye.reduction.baseline.result import BaselineCalibration
 
 MARK = f'format = "{FORMAT}"'
 
@@ -45,21 +44,21 @@ def write_calibration(
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
 
 
-def write_record(
+def record_text(
     calibration: "BaselineCalibration",
-    path: Path,
     inputs: Mapping[str, str],
     *,
+    name: str = "baseline",
     serial: str | None = None,
     measured_on: date | None = None,
     by: str | None = None,
     report: str | None = None,
-) -> None:
-    """Write BASELINE.toml atomically.
+) -> str:
+    """Text of BASELINE.toml.
 
     calibration   a calibration
-    path          new, or an earlier one of catseye
     inputs        SHA-256 of each input file, by name
+    name          of the baseline
     serial        of the instrument
     measured_on   day of the shots
     by            who measured
@@ -67,7 +66,7 @@ def write_record(
     """
     record = Baseline(
         format=FORMAT,
-        name=path.stem[:200] or "baseline",
+        name=name,
         serial=serial,
         measured_on=measured_on,
         by=by,
@@ -75,5 +74,4 @@ def write_record(
         inputs_sha256=dict(inputs),
         **record_values(calibration),
     )
-    with atomic_file(path, "--write", MARK) as pieces:
-        pieces.append(baseline_text(record))
+    return baseline_text(record)

@@ -11,15 +11,14 @@ import numpy as np
 from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.gateways.baseline.figures import baseline_figures
-from catseye.gateways.baseline.objects import baseline_object, baseline_verdict, passages, spans
-from catseye.gateways.baseline.tables import shot_residuals
+from catseye.gateways.baseline.objects import passages
 from catseye.gateways.writers.drawing import svgs
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline.instrument import BaselineCalibration
+    from catseye.reduction.baseline.result import BaselineCalibration
 
 CONTENTS = {
     "summary": "Summary",
@@ -48,7 +47,7 @@ def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: 
     )
     body = [
         header,
-        verdict_line(baseline_verdict(calibration)),
+        verdict_line(calibration.verdict),
         _summary(calibration),
         _pillars(calibration, drawn),
         _residuals(drawn),
@@ -66,7 +65,7 @@ def _summary(calibration: "BaselineCalibration") -> str:
     scale, u_scale = (v / PPM for v in s.of("scale"))
     valid = np.isfinite(scale)
     failed = [d for d in calibration.decisions if d.passed is False]
-    longest = max(spans(calibration), key=lambda span: span.distance)
+    longest = max(calibration.spans, key=lambda span: span.distance)
     cards = [
         card("Zero", f"{zero:+.3f} ± {u_zero:.3f} mm", "observed minus true"),
         card("Scale", f"{scale:+.2f} ± {u_scale:.2f} ppm" if valid else "not determined", "positive: reads too long"),
@@ -92,11 +91,11 @@ def _summary(calibration: "BaselineCalibration") -> str:
 
 def _pillars(calibration: "BaselineCalibration", drawn: dict[str, str]) -> str:
     rows = [
-        (name, f"{p['x']:.5f}", f"{p['u_x'] / MILLIMETRE:.3f}", f"{p['y']:.5f}", f"{p['u_y'] / MILLIMETRE:.3f}",
-         "" if p["height"] is None else f"{p['height']:.4f}")
-        for name, p in baseline_object(calibration)["pillars"].items()
+        (name, f"{p.x:.5f}", f"{p.u_x / MILLIMETRE:.3f}", f"{p.y:.5f}", f"{p.u_y / MILLIMETRE:.3f}",
+         "" if p.height is None else f"{p.height:.4f}")
+        for name, p in calibration.pillars.items()
     ]  # fmt: skip
-    pairs = [(a, b, f"{d:.5f}", f"{u / MILLIMETRE:.3f}") for a, b, d, u in spans(calibration)]
+    pairs = [(a, b, f"{d:.5f}", f"{u / MILLIMETRE:.3f}") for a, b, d, u in calibration.spans]
     height = (
         "one height" if calibration.reference_height is None else f"the height {calibration.reference_height:.3f} m"
     )
@@ -163,7 +162,7 @@ def _sets(calibration: "BaselineCalibration") -> str:
     s, shots = calibration.solution, calibration.observations
     first = np.flatnonzero(calibration.keep)[s.used.first]
     scatter = [
-        float(np.std(shot_residuals(calibration)[calibration.keep][s.used.set == k])) for k in range(len(s.residual))
+        float(np.std(calibration.shot_residuals[calibration.keep][s.used.set == k])) for k in range(len(s.residual))
     ]
     rows = [
         (

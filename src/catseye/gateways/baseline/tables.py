@@ -1,30 +1,30 @@
 """EDM baseline as CSV tables."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM
-from catseye.gateways.baseline.objects import Span, baseline_object, spans
 from catseye.gateways.writers.columns import Column, Table, each
+from catseye.reduction.baseline.result import Pillar, Span
 
 if TYPE_CHECKING:
-    from catseye.reduction.baseline.instrument import BaselineCalibration
+    from catseye.reduction.baseline.result import BaselineCalibration
 
 PAGE = "baseline.md"
-Pillar = tuple[str, dict[str, Any]]
+NamedPillar = tuple[str, Pillar]
 
-PILLARS = Table[Sequence[Pillar]](
+PILLARS = Table[Sequence[NamedPillar]](
     "pillars.csv",
     PAGE,
     (
         Column("pillar", "", "name, in the order along the line", each(lambda p: p[0])),
-        Column("x_m", "m", "place along the line from the first pillar to the last", each(lambda p: p[1]["x"]), ".6f"),
-        Column("y_m", "m", "offset from the line, to its left", each(lambda p: p[1]["y"]), ".6f"),
-        Column("height_m", "m", "height; empty where no file has it", each(lambda p: p[1]["height"]), ".6f"),
-        Column("u_x_mm", "mm", "standard uncertainty of x", each(lambda p: p[1]["u_x"] / MILLIMETRE), ".4f"),
-        Column("u_y_mm", "mm", "standard uncertainty of y", each(lambda p: p[1]["u_y"] / MILLIMETRE), ".4f"),
+        Column("x_m", "m", "place along the line from the first pillar to the last", each(lambda p: p[1].x), ".6f"),
+        Column("y_m", "m", "offset from the line, to its left", each(lambda p: p[1].y), ".6f"),
+        Column("height_m", "m", "height; empty where no file has it", each(lambda p: p[1].height), ".6f"),
+        Column("u_x_mm", "mm", "standard uncertainty of x", each(lambda p: p[1].u_x / MILLIMETRE), ".4f"),
+        Column("u_y_mm", "mm", "standard uncertainty of y", each(lambda p: p[1].u_y / MILLIMETRE), ".4f"),
     ),
 )
 
@@ -94,7 +94,7 @@ OBSERVATIONS = Table["BaselineCalibration"](
             lambda c: c.observations.direction / DEGREE,
             ".7f",
         ),
-        Column("residual_mm", "mm", "observed less adjusted", lambda c: shot_residuals(c) / MILLIMETRE, "+.4f"),
+        Column("residual_mm", "mm", "observed less adjusted", lambda c: c.shot_residuals / MILLIMETRE, "+.4f"),
         Column(
             "w_shot", "", "standardised residual of the shot in its set", lambda c: _kept(c.solution.w_shot, c), "+.3f"
         ),
@@ -118,18 +118,12 @@ OBSERVATIONS = Table["BaselineCalibration"](
 
 def pillars_csv(calibration: "BaselineCalibration") -> str:
     """Pillars along the line with their standard uncertainties."""
-    return PILLARS.csv(list(baseline_object(calibration)["pillars"].items()))
+    return PILLARS.csv(list(calibration.pillars.items()))
 
 
 def distances_csv(calibration: "BaselineCalibration") -> str:
     """Horizontal distances of all pairs of pillars at the reference height, with uncertainty."""
-    return DISTANCES.csv(spans(calibration))
-
-
-def shot_residuals(calibration: "BaselineCalibration") -> np.ndarray:
-    """Observed minus adjusted of every shot, (m,) m; nan for excluded shots."""
-    used = calibration.solution.used
-    return _kept(calibration.solution.residual[used.set] + used.within, calibration)
+    return DISTANCES.csv(calibration.spans)
 
 
 def observations_csv(calibration: "BaselineCalibration") -> str:

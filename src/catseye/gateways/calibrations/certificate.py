@@ -7,7 +7,7 @@ from html import escape
 from typing import Any, cast
 
 from catseye.gateways.calibrations.certificate_figure import calibration_figure
-from catseye.gateways.calibrations.certificate_record import calibration_verdict, record_lines
+from catseye.gateways.calibrations.certificate_record import record_lines
 from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import folded, page, paragraph, picture, section, table
@@ -46,7 +46,7 @@ def certificate(calibration: Calibration, when: datetime) -> str:
     body = [
         LINES,
         f'<header><h1>{TITLE}</h1><div class="faint">{escape(calibration.title)}</div></header>',
-        verdict_line(calibration_verdict(calibration)),
+        verdict_line(calibration.verdict),
         f'<dl class="head">{rows}</dl>',
         _results(calibration),
         section("method", "Method", paragraph(calibration.method)),

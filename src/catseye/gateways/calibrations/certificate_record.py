@@ -10,7 +10,6 @@ from typing import Any, cast
 import numpy as np
 
 from catseye.gateways.writers.objects import plain
-from catseye.gateways.writers.verdict import Verdict
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.kind import PROVENANCE
 from catseye.version import __version__
@@ -20,34 +19,12 @@ MARK = f'format = "{FORMAT}"'  # identifies a file of catseye
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def calibration_verdict(calibration: Calibration) -> Verdict:
-    """Verdict from the calibration's own tests; failed tests are named."""
-    off = sorted((o for o in calibration.plausible if o.passed is False), key=lambda o: not o.grave)
-    if off and off[0].grave:
-        return Verdict("failed", off[0].text)
-    failed = [decision for decision in calibration.decisions if decision.passed is False]
-    if any(decision.grave for decision in failed):
-        plural = "s" if len(failed) > 1 else ""
-        names = "; ".join(decision.name for decision in failed)
-        return Verdict("failed", f"{len(failed)} of its own test{plural} failed: {names}")
-    if off or failed:
-        return Verdict("doubtful", "; ".join(outcome.text for outcome in (*failed, *off)))
-    if calibration.degrees_of_freedom < 1 and not any(d.passed for d in calibration.decisions):
-        return Verdict("doubtful", "no redundancy: nothing was measured twice and no test is possible")
-    suspects = [number for number, state in enumerate(calibration.states, start=1) if state == "suspect"]
-    if suspects:
-        named = ", ".join(map(str, suspects[:8])) + (" ..." if len(suspects) > 8 else "")
-        return Verdict("doubtful", f"suspect readings: {named}")
-    passed = sum(decision.passed is True for decision in calibration.decisions)
-    return Verdict("good", f"its own tests passed ({passed})" if passed else "no test failed")
-
-
 def calibration_object(calibration: Calibration) -> dict[str, Any]:
     """Object that `catseye calibrate --json` prints; units in the keys, null for undefined."""
     return plain(
         {
             "format": FORMAT,
-            "verdict": calibration_verdict(calibration).to_object(),
+            "verdict": calibration.verdict.to_object(),
             "kind": calibration.kind,
             "title": calibration.title,
             **calibration.provenance,
@@ -85,7 +62,7 @@ def calibration_toml(calibration: Calibration) -> str:
         "title": calibration.title,
         **{key: provenance[key] for key in PROVENANCE},
         "made_by": f"catseye {__version__}",
-        "verdict": calibration_verdict(calibration).text,
+        "verdict": calibration.verdict.text,
         "variance_factor": calibration.variance_factor,
         "degrees_of_freedom": calibration.degrees_of_freedom,
         "method": calibration.method,

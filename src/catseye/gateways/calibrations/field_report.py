@@ -9,10 +9,6 @@ import numpy as np
 from catseye.constants import DEGREE
 from catseye.gateways.calibrations.certificate import SIGNATURES
 from catseye.gateways.calibrations.field_report_fields import (
-    FORMS,
-    HEADED,
-    Report,
-    ReportField,
     written_aid,
     written_matrix,
     written_u,
@@ -20,8 +16,10 @@ from catseye.gateways.calibrations.field_report_fields import (
 )
 from catseye.gateways.writers.page import page
 from catseye.geometry.mirror.mount import gamma, lambda_
+from catseye.reduction.calibrations.field_report import FORMS, Report, ReportField
 from catseye.version import __version__
 
+HEADED = 3  # fields in the form's head: number, date, initials
 SERVO_ROWS = 9  # an axis's position at the cube and its eight chip settings
 MATRIX_CELLS = 9
 WIDTH = 250  # of a sketch, in its own units

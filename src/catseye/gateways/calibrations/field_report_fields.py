@@ -1,211 +1,16 @@
-"""Fields of the notes' two calibration reports, in printed order, filled or blank."""
+"""Fields of the notes' two calibration reports as objects and text."""
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import date
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.gateways.calibrations.certificate import rounded
-from catseye.geometry.mirror.mount import gamma, lambda_
-from catseye.records.files.reading import Folder
-from catseye.records.site.mirror import MirrorGeometry
-from catseye.records.site.monument import MonumentGeometry
+from catseye.gateways.writers.passage import Passage
+from catseye.reduction.calibrations.field_report import FORMS, Report, ReportField
 
 LEAST_PLACES = 6  # decimals of a matrix, as the notes print them
-U_OF_ANY_PHASE = math.pi / math.sqrt(3.0)  # rad: unknown angle, uniform over a turn
-HEADED = 3  # fields in the form's head: number, date, initials
-SUBSCRIPTS = "₁₂₃"
-
-
-@dataclass(frozen=True)
-class ReportEntry:
-    """Field of the form.
-
-    name    as printed in the notes
-    key     key in the record
-    unit    unit of the value; empty for text and for the motion chip's integers
-    u       key of the standard uncertainty, if the record has one
-    sense   positive direction, or description
-    aid     additional notation of an angle: dms or arcsec
-    """
-
-    name: str
-    key: str
-    unit: str = ""
-    u: str = ""
-    sense: str = ""
-    aid: str = ""
-
-
-@dataclass(frozen=True)
-class Form:
-    """Report form: title and place in the notes, fields, matrix."""
-
-    title: str
-    figure: str
-    record: type[MonumentGeometry] | type[MirrorGeometry]
-    entries: tuple[ReportEntry, ...]
-    symbol: str
-    matrix: str
-    angles: tuple[str, ...]
-    u_angles: tuple[str, ...]
-    rule: str
-    turned: Callable[..., np.ndarray]
-
-
-@dataclass(frozen=True)
-class ReportField:
-    """Field with its value from the record; value and u are None where missing."""
-
-    entry: ReportEntry
-    value: Any = None
-    u: float | None = None
-
-
-@dataclass(frozen=True)
-class Report:
-    """Form filled from a record, or blank.
-
-    kind         monument or mirror
-    file         name of the record's file, empty for a blank form
-    sha256       hash of that file
-    fields       in the form's order, the matrix last
-    provenance   of the record: date, person, validity, report
-    notes        of the record
-    """
-
-    kind: str
-    file: str
-    sha256: str
-    fields: tuple[ReportField, ...]
-    provenance: dict[str, Any]
-    notes: str = ""
-
-    @property
-    def missing(self) -> tuple[ReportEntry, ...]:
-        """Entries missing in the record; empty for a blank form."""
-        return tuple(field.entry for field in self.fields if field.value is None) if self.file else ()
-
-
-def _servo(axis: int) -> tuple[ReportEntry, ...]:
-    """Motion chip settings of an axis, 0 azimuth, 1 elevation."""
-    commands = (
-        ("ABV", "velocity", "2⁻¹⁶ counts/sample"),
-        ("ABA", "acceleration", "2⁻¹⁶ counts/sample²"),
-        ("FKP", "proportional gain", ""),
-        ("FKI", "integral gain", ""),
-        ("FKD", "derivative gain", ""),
-        ("FIL", "integration limit", ""),
-        ("FSI", "derivative interval", ""),
-        ("ERL", "position error limit", "counts"),
-    )
-    return tuple(
-        ReportEntry(f"{name} {axis}", f"{name.lower()}_{axis}", unit, sense=what) for name, what, unit in commands
-    )
-
-
-FORMS = {
-    "monument": Form(
-        "Laser Monument Calibration Report",
-        "after the notes' Figure 2.2, rev 1/20/96",
-        MonumentGeometry,
-        (
-            ReportEntry("ZY", "monument"),
-            ReportEntry("DATE", "measured_on"),
-            ReportEntry("INITIALS", "by"),
-            ReportEntry("ZP NUMBER", "zp"),
-            ReportEntry("CONTROL PANEL", "control_panel"),
-            ReportEntry("ETHERNET ADDRESS", "ethernet_address"),
-            ReportEntry("IP ADDRESS", "ip_address"),
-            ReportEntry("x", "x_mm", "mm", "u_x_mm", "fixed point, east"),
-            ReportEntry("y", "y_mm", "mm", "u_y_mm", "fixed point, north"),
-            ReportEntry("z", "z_mm", "mm", "u_z_mm", "fixed point, up"),
-            ReportEntry("azimuth", "azimuth_deg", "deg", "u_alpha1_rad", "of ẑ, clockwise from north", "dms"),
-            ReportEntry(
-                "α₁ (π − azimuth)", "alpha1_rad", "rad", "u_alpha1_rad", "+ : ẑ from south towards east", "dms"
-            ),
-            ReportEntry("α₂ (rotation about ẑ)", "alpha2_rad", "rad", "u_alpha2_rad", "+ : x̂ rises", "arcsec"),
-            ReportEntry(
-                "α₃ (rotation about x̂)", "alpha3_rad", "rad", "u_alpha3_rad", "+ : ẑ (v-block) sinks", "arcsec"
-            ),
-            ReportEntry("LATITUDE", "latitude_deg", "deg", sense="north", aid="dms"),
-            ReportEntry("LONGITUDE", "longitude_deg", "deg", sense="east; west is negative", aid="dms"),
-            ReportEntry("ELEVATION", "elevation_m", "m", sense="above sea level"),
-            ReportEntry("WV X", "wv_x_m", "m", sense="state plane, east"),
-            ReportEntry("WV Y", "wv_y_m", "m", sense="state plane, north"),
-            ReportEntry("WV Z", "wv_z_m", "m", sense="NAVD88, up"),
-        ),
-        "γ",
-        "gamma",
-        ("alpha1_rad", "alpha2_rad", "alpha3_rad"),
-        ("u_alpha1_rad", "u_alpha2_rad", "u_alpha3_rad"),
-        "(x̂, ŷ, ẑ) = γ · (east, north, up), computed from α₁, α₂, α₃ by eq. 2.5",
-        gamma,
-    ),
-    "mirror": Form(
-        "Laser Mirror Assembly Calibration Report",
-        "after the notes' Figure 2.4, rev 1/20/96",
-        MirrorGeometry,
-        (
-            ReportEntry("ZP", "zp"),
-            ReportEntry("DATE", "measured_on"),
-            ReportEntry("INITIALS", "by"),
-            ReportEntry("LASER NUMBER", "laser_number"),
-            ReportEntry("DETECTOR NUMBER", "detector_number"),
-            ReportEntry("HEAD NUMBER", "head_number"),
-            ReportEntry("OSCILLATOR NUMBER", "oscillator_number"),
-            ReportEntry("LEAKAGE SIGNAL", "leakage_amplitude_volt", "V", "u_leakage_volt", "amplitude"),
-            ReportEntry("LEAKAGE SIGNAL", "leakage_phase_rad", "rad", "u_leakage_volt", "phase"),
-            ReportEntry("D₀", "d0_mm", "mm", "u_d0_mm", "scan point to internal cube"),
-            ReportEntry("Δx", "dx_mm", "mm", "u_offset_mm", "+ : ball to scan point along x̂"),
-            ReportEntry("Δy", "dy_mm", "mm", "u_offset_mm", "+ : up, along ŷ"),
-            ReportEntry("Δz", "dz_mm", "mm", "u_offset_mm", "+ : towards v-block, along ẑ"),
-            ReportEntry("β₁ rotation about x (θ)", "beta1_rad", "rad", "u_beta_rad", "+ : z̃ sinks", "arcsec"),
-            ReportEntry("β₂ rotation about y (ϕ)", "beta2_rad", "rad", "u_beta_rad", "+ : z̃ to x̂", "arcsec"),
-            ReportEntry("Nₐ₀", "na0", "counts", "u_zero_counts", "Θ = 0: beam along x̃ at Φ = 90°"),
-            ReportEntry("Nₑ₀", "ne0", "counts", "u_zero_counts", "Φ = 0: beam along z̃"),
-            ReportEntry("AZ LOW LIMIT", "az_low_limit", "counts"),
-            ReportEntry("AZ HIGH LIMIT", "az_high_limit", "counts"),
-            ReportEntry("AZM ZRG", "azm_zrg", "counts", sense="at the cube"),
-            *_servo(0),
-            ReportEntry("ELV ZRG", "elv_zrg", "counts", sense="at the cube"),
-            *_servo(1),
-        ),
-        "λ",
-        "lambda",
-        ("beta1_rad", "beta2_rad"),
-        ("u_beta_rad", "u_beta_rad"),
-        "(x̃, ỹ, z̃) = λ · (x̂, ŷ, ẑ), computed from β₁, β₂ by eq. 2.11",
-        lambda_,
-    ),
-}
-PROVENANCE = ("serial", "measured_on", "valid_until", "by", "report")
-
-
-def read_report(kind: str, path: Path) -> Report:
-    """Form of a kind, filled from the record in a TOML file.
-
-    kind    monument or mirror
-    path    of the record
-
-    Raises InputError if the file is missing or not a record of this kind.
-    """
-    folder = Folder(path.parent)
-    record = folder.record(path.name, FORMS[kind].record)
-    provenance = {key: getattr(record, key) for key in PROVENANCE}
-    return Report(
-        kind, path.name, folder.hashes[path.name], _filled(FORMS[kind], record), provenance, record.notes or ""
-    )
-
-
-def blank_report(kind: str) -> Report:
-    """Blank report form of a kind."""
-    return Report(kind, "", "", _filled(FORMS[kind], None), {})
 
 
 def report_object(report: Report, written: str | None) -> dict[str, Any]:
@@ -227,9 +32,21 @@ def report_object(report: Report, written: str | None) -> dict[str, Any]:
     }
 
 
+def report_passages(report: Report) -> list[Passage]:
+    """Title and number of the report, and the fields that its record lacks."""
+    number = report.fields[0].value
+    passages = [Passage("Report", FORMS[report.kind].title + (f", {number}" if number else ", blank"))]
+    if report.missing:
+        names = ", ".join(entry.key for entry in report.missing)
+        count = f"{len(report.missing)} of {len(report.fields)}"
+        passages.append(Passage("Left blank", f"{count}, not in {report.file}: {names}"))
+    return passages
+
+
 def written_value(field: ReportField) -> str:
     """Value with the digits that its u justifies; as in the record if u is unknown.
 
+    >>> from catseye.reduction.calibrations.field_report import ReportEntry
     >>> at = ReportEntry("x", "x_mm", "mm")
     >>> [written_value(ReportField(at, value, u)) for value, u in ((29503.7431, 0.1), (-2.4e-5, None), (12, 0.3))]
     ['29503.74', '-0.000024', '12']
@@ -252,12 +69,13 @@ def written_u(field: ReportField) -> str:
 def written_aid(field: ReportField) -> str:
     """Angle in degrees, minutes and seconds, or in seconds only.
 
+    >>> from catseye.reduction.calibrations.field_report import ReportEntry
     >>> written_aid(ReportField(ReportEntry("azimuth", "azimuth_deg", "deg", aid="dms"), 122.19722))
     '122° 11′ 50.0″'
     """
-    if field.value is None or not field.entry.aid:
+    if field.number is None or not field.entry.aid:
         return ""
-    seconds = field.value * (1.0 if field.entry.unit == "rad" else DEGREE) / ARCSECOND
+    seconds = field.number * (1.0 if field.entry.unit == "rad" else DEGREE) / ARCSECOND
     if field.entry.aid == "arcsec":
         return f"{round(seconds, 1) + 0.0:+.1f}″"  # + 0.0 turns minus zero into zero
     minutes, tenths = divmod(round(abs(seconds) * 10.0), 600)
@@ -266,60 +84,9 @@ def written_aid(field: ReportField) -> str:
 
 def written_matrix(fields: tuple[ReportField, ...]) -> list[str]:
     """Elements with the decimals of the largest u among them, at least six."""
-    if fields[0].value is None:
+    numbers = [field.number for field in fields if field.number is not None]
+    if not numbers:
         return ["" for _ in fields]
     stated = [field.u for field in fields if field.u]
     places = max(LEAST_PLACES, len(rounded(0.0, max(stated))[0].partition(".")[2]) if stated else 0)
-    return [f"{round(field.value, places) + 0.0:.{places}f}" for field in fields]
-
-
-def _filled(form: Form, record: Any) -> tuple[ReportField, ...]:
-    """Fields of the form, the matrix last."""
-    stated = [ReportField(e, getattr(record, e.key, None), _uncertainty(e, record)) for e in form.entries]
-    return (*stated, *_matrix(form, record))
-
-
-def _uncertainty(entry: ReportEntry, record: Any) -> float | None:
-    """Standard uncertainty of a field in its own unit."""
-    u = getattr(record, entry.u, None) if entry.u else None
-    if u is None or getattr(record, entry.key) is None:
-        return None
-    if entry.key == "azimuth_deg":
-        return float(u) / DEGREE
-    if entry.key == "leakage_phase_rad":  # each quadrature has u; the phase of a phasor below u is arbitrary
-        amplitude = record.leakage_amplitude_volt
-        return min(u / amplitude, U_OF_ANY_PHASE) if amplitude else U_OF_ANY_PHASE
-    return float(u)
-
-
-def _matrix(form: Form, record: Any) -> tuple[ReportField, ...]:
-    """The nine direction cosines, row by row, with u propagated from the angles."""
-    entries = [
-        ReportEntry(f"{form.symbol}{SUBSCRIPTS[i]}{SUBSCRIPTS[j]}", f"{form.matrix}_{i + 1}{j + 1}")
-        for i in range(3)
-        for j in range(3)
-    ]
-    if record is None:
-        return tuple(ReportField(entry) for entry in entries)
-    angles = np.array([getattr(record, key) for key in form.angles])
-    u = [getattr(record, key, None) for key in form.u_angles]
-    values = form.turned(*angles).ravel()
-    if any(value is None for value in u):
-        return tuple(ReportField(e, float(value)) for e, value in zip(entries, values, strict=True))
-    spread = matrix_uncertainty(form.turned, angles, np.array(u, dtype=float)).ravel()
-    return tuple(ReportField(e, float(v), float(s)) for e, v, s in zip(entries, values, spread, strict=True))
-
-
-def matrix_uncertainty(turned: Callable[..., np.ndarray], angles: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Standard uncertainties (3, 3) of a rotation matrix's elements.
-
-    turned    function from the angles to the matrix
-    angles    (n,), rad
-    u         (n,), rad, of each angle, independent
-
-    Source: [JCGM100] eq. 10. The derivatives are exact: in each angle t an element is a cos t + b sin t + c, whose
-    derivative is half the difference of its values at t ± a quarter turn.
-    """
-    quarter = 0.5 * math.pi * np.eye(len(angles))
-    slopes = np.array([0.5 * (turned(*(angles + q)) - turned(*(angles - q))) for q in quarter])
-    return np.sqrt(np.einsum("k,kij->ij", u**2, slopes**2))
+    return [f"{round(number, places) + 0.0:.{places}f}" for number in numbers]

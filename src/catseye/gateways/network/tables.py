@@ -133,7 +133,7 @@ OBSERVATIONS = Table[ObservationRows](
         Column("suspect", "", "`yes` where the test rejects it", lambda o: _yes(o.suspects)),
         Column("active", "", "`yes` where the adjustment used it", lambda o: _yes(o.measure("active"))),
         Column("checked", "", "`yes` where other observations check it", lambda o: _yes(o.measure("checked"))),
-        Column("group", "", "group of observations", lambda o: [o.findings.network.groups[g].name for g, _ in o.where]),
+        Column("group", "", "group of observations", lambda o: [o.adjusted.network.groups[g].name for g, _ in o.where]),
         Column("place", "", "line or table of the file that it was read from", lambda o: o.places),
     ),
     also=("epoch-*-observations.csv",),

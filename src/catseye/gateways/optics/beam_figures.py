@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from catseye.aliases import Progress
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
 from catseye.gateways.optics.tables import PLACES, RETURNED
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
 from catseye.gateways.writers.objects import json_page
-from catseye.gateways.writers.verdict import Verdict
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.optics import coating
-from catseye.records.files.reading import Folder
-from catseye.records.site.beam import BeamTrain
-from catseye.reduction.optics.beam import BeamPath, beam_profile, reduce_beam
+from catseye.reduction.optics.beam import BeamPath, beam_profile, read_beam
 
 FORMAT = "catseye-beam-1"
 DRAWN = ("gold", "silver", "aluminium", "protected-aluminium", "dielectric")
@@ -165,19 +163,6 @@ def coating_plot(
     return coating_figure(names, wavelength_um, incidence), summary
 
 
-def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict[str, str]]:
-    """Beam train of a file, reduced, and the file's hash.
-
-    file       the record
-    distance   m, overrides the record's
-    """
-    folder = Folder(file.parent)
-    train = folder.record(file.name, BeamTrain)
-    if distance is not None:
-        train = train.model_copy(update={"distance_m": distance})
-    return reduce_beam(train), folder.hashes
-
-
 def beam_object(beam_path: BeamPath) -> dict[str, Any]:
     """Object of a beam train, SI units.
 
@@ -185,13 +170,8 @@ def beam_object(beam_path: BeamPath) -> dict[str, Any]:
     """
     keys = ("leg", "name", "way", "radius", "curvature", "aperture", "clipped", "power")
     rows = ("distance", "radius", "hit", "collected", "power", "status")
-    failures = [row for row in beam_path.returned if row.status != "ok"]
-    good = beam_path.status == "ok" and not failures
-    why = "every element passes the beam" if good else beam_path.status
-    if failures and beam_path.status == "ok":
-        why = f"no power from {', '.join(f'{row.distance:g}' for row in failures)} m: {failures[0].status}"
     return {
-        "verdict": Verdict("good" if good else "doubtful", why).to_object(),
+        "verdict": beam_path.verdict.to_object(),
         "name": beam_path.train.name,
         "distance": beam_path.train.distance_m,
         "status": beam_path.status,
@@ -239,12 +219,13 @@ def lines(beam_path: BeamPath) -> Iterator[str]:
         yield f"{name.replace('_', ' ')}: {f'{value * 1e6:.3f} µm' if name.startswith('range') else f'{value:.4g}'}"
 
 
-def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str]) -> None:
+def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str], progress: Progress | None = None) -> None:
     """Write tables, figure, JSON, and the provenance with their hashes.
 
     beam_path   a reduced beam train
     directory   existing, from `writers.output.atomic_directory`
     inputs      hashes of the input files
+    progress    called for each file
     """
     files: Files = {
         "beam.csv": lambda: PLACES.csv(beam_path.places),
@@ -253,7 +234,7 @@ def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str]) -> 
         "beam.svg": lambda: beam_figure(beam_path),
     }
     provenance = {"format": FORMAT, "made_by": "catseye beam", "settings": {"distance_m": beam_path.train.distance_m}}
-    write_files(files, directory, {**provenance, **origin(datetime.now(UTC), inputs)})
+    write_files(files, directory, {**provenance, **origin(datetime.now(UTC), inputs)}, progress=progress)
 
 
 def _cell(value: float, form: str) -> str:

@@ -1,69 +1,20 @@
 """Laser safety of a beam as JSON and text."""
 
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from catseye.gateways.writers.verdict import Verdict
-from catseye.optics.safety.hazard import (
-    AVERSION,
-    BINOCULARS,
-    NAKED,
-    NOTICE,
-    TIME_BASE,
-    LaserBeam,
-    classify,
-    hazard_zone,
-    returned_power,
-)
-from catseye.optics.safety.limits import ALPHA_MIN, EDITIONS, PUPIL, eye_limits, eye_mpe, factors, skin_limit
-from catseye.optics.safety.sweep import sweep_hazard_distance
+from catseye.optics.safety.hazard import NOTICE
+from catseye.optics.safety.limits import ALPHA_MIN
 
-DURATIONS = (AVERSION, 10.0, 100.0, 3e4)  # s, of the table
+if TYPE_CHECKING:
+    from catseye.reduction.optics.safety import SafetyAssessment
 
 
-@dataclass(frozen=True)
-class Question:
-    """Beam and viewing conditions to assess.
-
-    beam                 of the laser
-    edition              a name in EDITIONS
-    duration             s, of the exposure; None for 0.25 s of visible light, 100 s of infrared
-    aided                True for viewing through binoculars
-    subtense             rad, of the apparent source
-    scan, period         rad/s of the beam, s from one pass to the next; None for none
-    reflector_distance   m, and diameter, m, of a retroreflector; None for none
-    """
-
-    beam: LaserBeam
-    edition: str = EDITIONS[0]
-    duration: float | None = None
-    aided: bool = False
-    subtense: float = ALPHA_MIN
-    scan: float | None = None
-    period: float | None = None
-    reflector_distance: float | None = None
-    reflector_diameter: float = 0.0508
-
-    @property
-    def seconds(self) -> float:
-        """Duration of the exposure."""
-        if self.duration is not None:
-            return self.duration
-        return AVERSION if self.beam.wavelength_um < 0.7 else TIME_BASE
-
-
-def safety_object(question: Question) -> dict[str, Any]:
+def safety_object(assessment: "SafetyAssessment") -> dict[str, Any]:
     """Object that `catseye safety --json` prints; SI units unless a key says otherwise."""
-    beam, seconds = question.beam, question.seconds
-    viewer = BINOCULARS if question.aided else NAKED
-    outcome = classify(beam, edition=question.edition, subtense=question.subtense)
-    classes = {name: classify(beam, edition=name, subtense=question.subtense).laser_class for name in EDITIONS}
-    limits = eye_limits(beam.wavelength_um, seconds, question.subtense, edition=question.edition)
-    governing = eye_mpe(beam.wavelength_um, seconds, question.subtense, edition=question.edition)
-    skin = skin_limit(beam.wavelength_um, seconds)
-    correction_factors = factors(beam.wavelength_um, seconds, question.subtense)
+    question, outcome, exposure = assessment.question, assessment.outcome, assessment.exposure
+    beam, scan, returned = question.beam, assessment.scan, assessment.returned
     return {
-        "verdict": _verdict(outcome.laser_class).to_object(),
+        "verdict": assessment.verdict.to_object(),
         "notice": NOTICE,
         "edition": question.edition,
         "power": beam.power,
@@ -71,85 +22,25 @@ def safety_object(question: Question) -> dict[str, Any]:
         "diameter": beam.diameter,
         "divergence": beam.divergence,
         "beam_quality": beam.quality,
-        "duration": seconds,
+        "duration": question.seconds,
         "subtense": question.subtense,
-        "factors": {name: getattr(correction_factors, name) for name in ("c_a", "c_b", "c_c", "c_e", "t_1", "t_2")},
-        "mpe_eye": governing.irradiance,
-        "mpe_eye_protects_from": governing.name,
-        "mpe_skin": skin.irradiance,
+        "factors": {name: getattr(assessment.correction, name) for name in ("c_a", "c_b", "c_c", "c_e", "t_1", "t_2")},
+        "mpe_eye": assessment.governing.irradiance,
+        "mpe_eye_protects_from": assessment.governing.name,
+        "mpe_skin": assessment.skin.irradiance,
         "class": outcome.laser_class,
-        "class_by_edition": classes,
+        "class_by_edition": dict(assessment.classes),
         "reasons": list(outcome.reasons),
         "emissions": outcome.emissions,
         "class_limits": outcome.limits,
-        "viewer": viewer.name,
-        "hazard_from": hazard_zone(beam, limits, viewer)[0],
-        "nohd": hazard_zone(beam, limits)[1],
-        "nohd_aided": hazard_zone(beam, limits, BINOCULARS)[1],
-        "skin_hazard_distance": hazard_zone(beam, (skin,))[1],
-        "scan": _scan(question),
-        "returned": _returned(question),
-        "what_if": [_what_if(question, t) for t in DURATIONS],
-    }
-
-
-def _verdict(laser_class: str) -> Verdict:
-    """Verdict; at best that no limit is exceeded: a warning, never a certificate."""
-    if laser_class == "1":
-        return Verdict("good", "class 1 as described; this is a computation, never a certificate")
-    return Verdict("doubtful", f"class {laser_class}: a hazard as described; this is a warning, never a certificate")
-
-
-def _what_if(question: Question, seconds: float) -> dict[str, float]:
-    """Row of the table for one duration."""
-    beam = question.beam
-    limits = eye_limits(beam.wavelength_um, seconds, question.subtense, edition=question.edition)
-    skin = skin_limit(beam.wavelength_um, seconds)
-    return {
-        "duration": seconds,
-        "mpe_eye": min(limit.irradiance for limit in limits),
-        "mpe_skin": skin.irradiance,
-        "nohd": hazard_zone(beam, limits)[1],
-        "nohd_aided": hazard_zone(beam, limits, BINOCULARS)[1],
-        "skin_hazard_distance": hazard_zone(beam, (skin,))[1],
-    }
-
-
-def _scan(question: Question) -> dict[str, Any] | None:
-    if question.scan is None:
-        return None
-    conditions: dict[str, Any] = {
-        "duration": question.seconds,
-        "period": question.period,
-        "subtense": question.subtense,
-        "edition": question.edition,
-    }
-    far = sweep_hazard_distance(
-        question.beam, question.scan, viewer=BINOCULARS if question.aided else NAKED, **conditions
-    )
-    return {"rate": question.scan, "period": question.period, "hazard_distance": far}
-
-
-def _returned(question: Question) -> dict[str, Any] | None:
-    distance = question.reflector_distance
-    if distance is None:
-        return None
-    viewer = BINOCULARS if question.aided else NAKED
-    size: dict[str, Any] = {"reflector": question.reflector_diameter, "viewer": viewer}
-
-    def within(aperture: float) -> float:
-        return returned_power(question.beam, distance, aperture=aperture, **size)
-
-    limits = eye_limits(question.beam.wavelength_um, question.seconds, question.subtense, edition=question.edition)
-    times, governing = max(((within(m.aperture) / m.power, m) for m in limits), key=lambda row: row[0])
-    return {
-        "distance": distance,
-        "diameter": question.reflector_diameter,
-        "power_into_eye": within(PUPIL),
-        "limit": governing.power,
-        "limit_aperture": governing.aperture,
-        "limit_protects_from": governing.name,
-        "times_limit": times,
+        "viewer": question.viewer.name,
+        "hazard_from": assessment.hazard_from,
+        "nohd": exposure.nohd,
+        "nohd_aided": exposure.nohd_aided,
+        "skin_hazard_distance": exposure.skin_hazard_distance,
+        "scan": None if scan is None else dict(vars(scan)),
+        "returned": None if returned is None else dict(vars(returned)),
+        "what_if": [dict(vars(row)) for row in assessment.what_if],
     }
 
 

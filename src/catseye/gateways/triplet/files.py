@@ -55,9 +55,9 @@ def refuse_namesakes(paths: list[Path]) -> None:
     by_stem: dict[str, Path] = {}
     for path in paths:
         if f"{path.stem}.json" == PROVENANCE:
-            raise InputError(f"{path}: {PROVENANCE} of --out would be written twice (expected a sheet of another name)")
+            raise InputError(f"{path}: {PROVENANCE} would be written twice (expected a sheet of another name)")
         if path.stem in by_stem:
             raise InputError(
-                f"{path}: has the name of {by_stem[path.stem]} (expected sheets of different names for --out)"
+                f"{path}: has the name of {by_stem[path.stem]} (expected sheets of different names in one output)"
             )
         by_stem[path.stem] = path

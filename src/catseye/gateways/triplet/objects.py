@@ -5,26 +5,9 @@ from typing import Any
 import numpy as np
 
 from catseye.gateways.triplet.symbols import PLACEMENT, PLATE, UNIT, point_places, symbol_values
-from catseye.gateways.writers.verdict import Verdict
 from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 
-LIKELY = 0.95  # least probability of conformity of an undoubted acceptance
 CYCLES = ("N_1", "N_2", "N_BC", "margin")  # listed under `cycles`
-
-
-def triplet_verdict(reduction: TripletReduction) -> Verdict:
-    """Verdict by the memo's limit and the probability of conformity."""
-    if not np.isfinite(reduction.difference):
-        return Verdict("failed", "no placement gave a height to compare with the surface plate's")
-    limit = f"{1e3 * abs(reduction.difference):.3f} mm against a limit of {1e3 * TOLERANCE:.2f}"
-    chance = reduction.conformity_probability
-    if not reduction.accepted:
-        return Verdict("failed", f"not accepted: the two heights differ by {limit}")
-    if np.isfinite(chance) and chance < LIKELY:
-        return Verdict("doubtful", f"accepted, but its probability of conformity is {chance:.2f} ({limit})")
-    if reduction.suspects:
-        return Verdict("doubtful", f"accepted, with suspect placements ({limit})")
-    return Verdict("good", f"accepted: the two heights differ by {limit}")
 
 
 def triplet_object(reduction: TripletReduction, file: str) -> dict[str, Any]:
@@ -37,7 +20,7 @@ def triplet_object(reduction: TripletReduction, file: str) -> dict[str, Any]:
     """
     m, plate = reduction.measurement, reduction.plate
     return {
-        "verdict": triplet_verdict(reduction).to_object(),
+        "verdict": reduction.verdict.to_object(),
         "file": file,
         "triplet": m.triplet,
         "serials": [m.left_prism.serial, m.right_prism.serial],

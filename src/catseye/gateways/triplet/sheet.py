@@ -6,7 +6,6 @@ from datetime import datetime
 from html import escape
 from typing import Any
 
-from catseye.gateways.triplet.objects import triplet_verdict
 from catseye.gateways.triplet.symbols import PLACEMENT, PLATE, POINTS, UNIT, Symbol, point_places, symbol_values
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
@@ -101,7 +100,7 @@ def text_sheet(reduction: TripletReduction, file: str) -> str:
         f"TRIPLET {m.triplet}   prisms {m.left_prism.serial} (left), {m.right_prism.serial} (right)   {file}",
         f"measured on {m.measured_on} by {m.by}; lengths mm, angles rad; air by {m.air_model}",
         "",
-        f"{'Verdict':<12}{triplet_verdict(reduction).text}",
+        f"{'Verdict':<12}{reduction.verdict.text}",
         *(f"{title:<12}{text}" for title, text in results(reduction)),
         "",
         "UNIT",
@@ -158,7 +157,7 @@ def html_sheet(reduction: TripletReduction, file: str, when: datetime, digest: s
         f"<header><h1>{TITLE}: {escape(m.triplet)}</h1>"
         f'<div class="faint">prisms {m.left_prism.serial} (left) and {m.right_prism.serial} (right); measured on '
         f"{m.measured_on} by {escape(m.by)}; air by {m.air_model}; u = standard uncertainty, 1σ</div></header>",
-        verdict_line(triplet_verdict(reduction)),
+        verdict_line(reduction.verdict),
         '<div class="cards">' + "".join(_cards(reduction)) + "</div>",
         f"<dl>{words}</dl>",
         section(

@@ -121,13 +121,13 @@ class SoundField:
         )
         wind, u_wind = self._wind(lines)
         return LineAir(
-            means.value,
-            means.covariance,
-            wind,
-            u_wind,
-            light.group_refractivity + direct @ means.parameters[at],
-            np.sqrt(variance),
-            means.resolution,
+            temperature_c=means.value,
+            covariance_c2=means.covariance,
+            wind=wind,
+            u_wind=u_wind,
+            group_refractivity=light.group_refractivity + direct @ means.parameters[at],
+            u_group_refractivity=np.sqrt(variance),
+            resolution=means.resolution,
         )
 
     def _wind(self, lines: Lines) -> tuple[np.ndarray, np.ndarray]:
@@ -221,7 +221,13 @@ def sound_field(
             raise EstimationError(NO_SOUND_TIME.format(len(time)))
         noise = np.diag((usable.per_second(along) * usable.u_time) ** 2)
         along = np.zeros_like(along) if wind is None else along
-        estimate = tomogram(LineMeans(usable.lines, observed, noise, along, design, sigmas), temperature, wind)
+        estimate = tomogram(
+            LineMeans(
+                lines=usable.lines, observed=observed, covariance=noise, along=along, design=design, sigmas=sigmas
+            ),
+            temperature,
+            wind,
+        )
         at[good] = estimate.scalar_along(usable.lines).value
         if wind is not None:
             axes = [np.tile(axis, (len(observed), 1)) for axis in np.eye(3)]

@@ -15,7 +15,8 @@ from catseye.errors import InputError, ValidityError
 from catseye.names import AIR_MODEL
 from catseye.records.files.refusal import refusal
 from catseye.records.night.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
-from catseye.reduction.air.acoustic import USED, PathTemperatures, PathWind, SoundLine, StationAir, path_temperatures
+from catseye.reduction.air.acoustic import PathTemperatures, PathWind, SoundLine, StationAir, path_temperatures
+from catseye.reduction.air.sound_path import AcousticPath, AcousticReduction, ChannelTrace, SoundShots
 from catseye.signal.delay.arrival import DelayPlan, DelayStatus
 from catseye.signal.delay.waveform import sampled
 
@@ -24,88 +25,13 @@ LOOP_WINDOW = 5e-3  # s, about the emission
 MICROSECOND = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class ChannelTrace:
-    """First shot of a channel, for a figure.
-
-    time, samples       s from the file's first sample, and codes or volts about the arrival
-    lag, correlation    s, and the amplitude of a signal there
-    arrival             s, NaN without one
-    """
-
-    channel: str
-    file: str
-    time: np.ndarray
-    samples: np.ndarray
-    lag: np.ndarray
-    correlation: np.ndarray
-    arrival: float
-
-
-@dataclass(frozen=True, eq=False)
-class SoundShots:
-    """Times, travel times and status of k shots.
-
-    mjd                of the emission, UTC
-    time_ab, time_ba   s, clock offset and loop-back subtracted; NaN without a result; time_ba None for one direction
-    u_time             (2, k) s
-    snr                (2, k) of the correlations, NaN for a table of times
-    texts              status of each shot: "ab: good; ba: good", or "" for a table's row
-    weather            temperature °C, pressure hPa, humidity %, each (k,)
-    file               of each shot
-    traces             for figures
-    """
-
-    mjd: np.ndarray
-    time_ab: np.ndarray
-    time_ba: np.ndarray | None
-    u_time: np.ndarray
-    snr: np.ndarray
-    texts: tuple[str, ...]
-    weather: tuple[np.ndarray, np.ndarray, np.ndarray]
-    file: tuple[str, ...]
-    traces: tuple[ChannelTrace, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class AcousticPath:
-    """One path at k times.
-
-    sheet         of the path
-    sheet_file    its name
-    shots         the travel times
-    temperatures  of the air, with wind and index
-    model         formula of the speed of sound
-    air_model     formula of the index
-    hashes        SHA-256 of each file read
-    """
-
-    sheet: AcousticSheet
-    sheet_file: str
-    shots: SoundShots
-    temperatures: PathTemperatures
-    model: str
-    air_model: str
-    hashes: dict[str, str]
-
-    @property
-    def used(self) -> np.ndarray:
-        """True (k,) for shots with a temperature."""
-        return np.array([status == USED for status in self.temperatures.status])
-
-    def status(self, shot: int) -> str:
-        """Status of one shot as a text."""
-        text, formula = self.shots.texts[shot], self.temperatures.status[shot]
-        return "; ".join(part for part in (text, "" if formula == USED else formula) if part) or USED
-
-
 def reduce_acoustic(
     files: Sequence[Path],
     sheet: Path | None = None,
     *,
     model: str = THERMOMETRY,
     air_model: str = AIR_MODEL,
-) -> list[AcousticPath]:
+) -> AcousticReduction:
     """Temperatures of paths from files of sound or travel times.
 
     files       .wav or .csv
@@ -121,7 +47,8 @@ def reduce_acoustic(
         if sheet_path.resolve() == file.resolve():
             raise refusal(file.name, "is both recording and sheet (expected a sheet .toml)")
         groups.setdefault(sheet_path.resolve(), (sheet_path, []))[1].append(file)
-    return [_path(sheet_path, members, model, air_model) for sheet_path, members in groups.values()]
+    paths = (_path(sheet_path, members, model, air_model) for sheet_path, members in groups.values())
+    return AcousticReduction(tuple(paths))
 
 
 def _path(sheet_path: Path, files: Sequence[Path], model: str, air_model: str) -> AcousticPath:
@@ -149,7 +76,15 @@ def _path(sheet_path: Path, files: Sequence[Path], model: str, air_model: str) -
         temperatures = _temperatures(shots, sheet, model, air_model)
     except ValidityError as problem:
         raise refusal(sheet_path.name, str(problem)) from problem
-    return AcousticPath(sheet, sheet_path.name, shots, temperatures, model, air_model, hashes)
+    return AcousticPath(
+        sheet=sheet,
+        sheet_file=sheet_path.name,
+        shots=shots,
+        temperatures=temperatures,
+        model=model,
+        air_model=air_model,
+        hashes=hashes,
+    )
 
 
 def _recorded_shots(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> SoundShots:
@@ -199,9 +134,16 @@ def _recorded_shots(recording: Recording, sheet: AcousticSheet, sheet_file: str)
     if "ab" not in times:
         raise refusal(recording.file, "has no channel 'ab' (one direction is measured from ranger to target)")
     return SoundShots(
-        mjd, times["ab"], times.get("ba"), np.array(u_times), np.array(snrs), tuple("; ".join(t) for t in texts),
-        weather, (recording.file,) * len(mjd), tuple(listener.traces),
-    )  # fmt: skip
+        mjd=mjd,
+        time_ab=times["ab"],
+        time_ba=times.get("ba"),
+        u_time=np.array(u_times),
+        snr=np.array(snrs),
+        texts=tuple("; ".join(t) for t in texts),
+        weather=weather,
+        file=(recording.file,) * len(mjd),
+        traces=tuple(listener.traces),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,9 +199,16 @@ class _Listener:
         delay = np.where(good, delays.delay + at, np.nan)
         lag, height = plan.correlation(np.nan_to_num(rows[0].astype(float)), float(expected[0] - at[0]))
         self.traces.append(
-            ChannelTrace(channel, self.recording.file, at[0] + np.arange(wide) / self.sampling_hz, rows[0], lag + at[0],
-                  height, float(delay[0]))
-        )  # fmt: skip
+            ChannelTrace(
+                channel=channel,
+                file=self.recording.file,
+                time=at[0] + np.arange(wide) / self.sampling_hz,
+                samples=rows[0],
+                lag=lag + at[0],
+                correlation=height,
+                arrival=float(delay[0]),
+            )
+        )
         texts = [delays.text(k) for k in range(len(at))]
         return _Arrivals(delay, np.where(good, delays.u_delay, np.nan), delays.snr, texts)
 
@@ -290,14 +239,14 @@ def _timed(times: TravelTimes, sheet: AcousticSheet) -> SoundShots:
             f"{times.file}: its times have no standard uncertainty (expected u_time_us, a column or in the sheet)"
         )
     return SoundShots(
-        times.mjd,
-        times.time_ab - offset,
-        None if times.time_ba is None else times.time_ba + offset,
-        np.stack([u, u]),
-        np.full((2, count), np.nan),
-        ("",) * count,
-        (t, p, h),
-        (times.file,) * count,
+        mjd=times.mjd,
+        time_ab=times.time_ab - offset,
+        time_ba=None if times.time_ba is None else times.time_ba + offset,
+        u_time=np.stack([u, u]),
+        snr=np.full((2, count), np.nan),
+        texts=("",) * count,
+        weather=(t, p, h),
+        file=(times.file,) * count,
     )
 
 
@@ -313,16 +262,17 @@ def _joined(parts: Sequence[SoundShots], sheet_file: str) -> SoundShots:
 
     temperature, pressure, humidity = (column([part.weather[i] for part in parts]) for i in range(3))
     texts, files = ([item for part in parts for item in getattr(part, name)] for name in ("texts", "file"))
+    both = [part.time_ba for part in parts if part.time_ba is not None]
     return SoundShots(
-        column([part.mjd for part in parts]),
-        column([part.time_ab for part in parts]),
-        None if one_way == {True} else column([part.time_ba for part in parts if part.time_ba is not None]),
-        column([part.u_time for part in parts]),
-        column([part.snr for part in parts]),
-        tuple(texts[i] for i in order),
-        (temperature, pressure, humidity),
-        tuple(files[i] for i in order),
-        parts[0].traces,
+        mjd=column([part.mjd for part in parts]),
+        time_ab=column([part.time_ab for part in parts]),
+        time_ba=None if one_way == {True} else column(both),
+        u_time=column([part.u_time for part in parts]),
+        snr=column([part.snr for part in parts]),
+        texts=tuple(texts[i] for i in order),
+        weather=(temperature, pressure, humidity),
+        file=tuple(files[i] for i in order),
+        traces=parts[0].traces,
     )
 
 

@@ -114,7 +114,16 @@ def site_air(
     )
     names = tuple(station.name for station in site.weather_station)
     notes = _notes(profile, names, start)
-    return SiteAir(profile, names, start, block, site.ranging.wavelength_um, model, co2_ppm, notes)
+    return SiteAir(
+        profile=profile,
+        stations=names,
+        start_mjd=start,
+        block=block,
+        wavelength_um=site.ranging.wavelength_um,
+        model=model,
+        co2_ppm=co2_ppm,
+        notes=notes,
+    )
 
 
 def site_readings(site: SiteRecord, weather: Weather, without: Sequence[str] = ()) -> WeatherReadings:
@@ -134,13 +143,13 @@ def site_readings(site: SiteRecord, weather: Weather, without: Sequence[str] = (
         raise InputError(f"no weather reading remains without {', '.join(without) or 'any station'}")
     height = np.array([station.elevation_m - site.site.elevation_of_z0_m for station in site.weather_station])
     return WeatherReadings(
-        (weather.mjd_utc[selected] - weather.mjd_utc.min()) * SECONDS_PER_DAY,
-        height[number[selected]],
-        number[selected],
-        weather.temperature_c[selected],
-        weather.pressure_hpa[selected],
-        weather.humidity_percent[selected],
-        np.ones(int(selected.sum()), dtype=int),
+        seconds=(weather.mjd_utc[selected] - weather.mjd_utc.min()) * SECONDS_PER_DAY,
+        z=height[number[selected]],
+        station=number[selected],
+        temperature_c=weather.temperature_c[selected],
+        pressure_hpa=weather.pressure_hpa[selected],
+        humidity_percent=weather.humidity_percent[selected],
+        count=np.ones(int(selected.sum()), dtype=int),
     )
 
 

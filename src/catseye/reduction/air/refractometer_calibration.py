@@ -15,9 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.atmosphere.index.air import MODELS, group_refractivity
+from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.records.site.validity import expired
 from catseye.reduction.air.group_index import AbsoluteIndex, absolute_group_index
-from catseye.reduction.air.refractometer_fit import PathFit
+from catseye.reduction.air.refractometer_fit import PathFit, drift_name
 from catseye.reduction.air.refractometer_night import (
     FEWEST_AFTER_JUMP,
     FollowedPhase,
@@ -28,10 +30,12 @@ from catseye.reduction.air.refractometer_night import (
     path_weather,
 )
 from catseye.signal.cycles.whole import CycleStatus
+from catseye.verdict import Verdict
 
 AGREES = 3.0  # standard uncertainties within which slopes agree
 UNKNOWN_SLOPE = 1e3  # prior u of a free slope over the theoretical one
 LEAST_SLOPE = 0.3  # u of the slope's ratio beyond which it is meaningless
+LARGE_FACTOR = 3.0  # standard deviations of a variance factor above 1 beyond which the scatter is more than claimed
 STATUS = ("good", "stray", "left out", "weather off", "no weather", "uncalibrated")
 
 
@@ -59,6 +63,7 @@ class PathCalibration:
     phase_0        rad, of the first calibrated section: the mean of its readings
     temperature_0_c, pressure_0_hpa, humidity_0_percent   mean weather of that section's readings
     names, x, covariance   of all parameters (ppm, °C, hPa, %, rad): see `names`
+    drift_hours    (k) knots of the drift, h since the first reading
     budget         cause -> its part of u_index_0
     refractivity, u_refractivity   (m,) n_g - 1 by the phase; nan where the phase is not followed or not calibrated
     temperature_c, u_temperature_c (m,) path mean that gives this index at the measured pressure and humidity
@@ -89,6 +94,7 @@ class PathCalibration:
     names: tuple[str, ...]
     x: np.ndarray
     covariance: np.ndarray
+    drift_hours: tuple[float, ...]
     budget: dict[str, float]
     refractivity: np.ndarray
     u_refractivity: np.ndarray
@@ -108,6 +114,36 @@ class PathCalibration:
     path_length: float
     u_path_length: float
     notes: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on scatter against the claim, slope of the phase, and validity of the sheet."""
+        readings = self.readings
+        validity = expired({"the path": readings.sheet}, readings.mjd_utc[-1])
+        return self._agreement().hearing(validity + humidity_doubts(readings.humidity_percent))
+
+    def _agreement(self) -> Verdict:
+        """Verdict on phases and weather alone."""
+        if not self.slope.agrees:
+            ratio = self.slope.ratio
+            why = f"the slope of phase against the weather's index is {ratio:.3f} of theory, not 1"
+            return Verdict("doubtful", why)
+        factor, degrees = self.variance_factor, self.degrees_of_freedom
+        if not degrees >= 1.0:
+            return Verdict("doubtful", "the calibration has no redundancy to check it")
+        if factor > 1.0 + LARGE_FACTOR * (2.0 / degrees) ** 0.5:
+            return Verdict("doubtful", f"phases and weather scatter more than claimed (variance factor {factor:.2f})")
+        return Verdict("good", f"phases and weather agree as claimed (variance factor {factor:.2f})")
+
+    @property
+    def thermometers(self) -> dict[str, tuple[float, float]]:
+        """Offset of each thermometer and its standard uncertainty, °C, by the name of its column."""
+        return {name: self.of(name) for name in self.readings.thermometers}
+
+    @property
+    def drift(self) -> tuple[tuple[float, float, float], ...]:
+        """Hours of each knot of the drift, the drift and its standard uncertainty, rad."""
+        return tuple((hours, *self.of(drift_name(hours))) for hours in self.drift_hours)
 
     def of(self, name: str) -> tuple[float, float]:
         """Parameter and its standard uncertainty."""
@@ -174,6 +210,7 @@ def _calibration(fit: PathFit) -> PathCalibration:
         names=fit.names,
         x=fit.x,
         covariance=fit.covariance,
+        drift_hours=tuple(round(float(h), 2) for h in fit.knots),
         budget=_budget(fit, at),
         refractivity=refractivity,
         u_refractivity=u,

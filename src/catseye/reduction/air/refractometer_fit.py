@@ -26,6 +26,17 @@ MOST_KNOTS = 48  # of the drift
 FEWEST_PLACES = 3  # least thermometers for an estimate of the air's differences between them
 
 
+def drift_name(hours: float) -> str:
+    """Parameter of the drift at a knot.
+
+    hours   since the first reading
+
+    >>> drift_name(1.5)
+    'drift at 1.50 h'
+    """
+    return f"drift at {hours:.2f} h"
+
+
 class PathFit:
     """Normal equations of one night, and its used values.
 
@@ -100,7 +111,7 @@ class PathFit:
             rate = sheet.drift_mrad_per_root_hour * 1e-3
             steps = np.diff(self.knots, prepend=0.0)
             prior[len(names) :, len(names) :] = increments.T @ (increments / (rate**2 * steps)[:, None])
-        return (*names, *(f"drift at {h:.2f} h" for h in self.knots)), prior
+        return (*names, *(drift_name(h) for h in self.knots)), prior
 
     def at(self, rows: np.ndarray) -> np.ndarray:
         """Derivatives of the path's index minus dphi/K at readings (ppm).

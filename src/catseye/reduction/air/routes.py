@@ -90,11 +90,13 @@ class Pressure:
     value       total pressure
     u           its standard uncertainty
     u_formula   part of it that exact readings leave
+    stated      True: the uncertainty of a reading is known
     """
 
     value: ArrayLike
     u: ArrayLike = 0.0
     u_formula: ArrayLike = 0.0
+    stated: bool = False
 
 
 def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
@@ -121,6 +123,8 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
     """
     if (pressure_hpa is None) == (barometer_mmhg is None):
         raise ArgumentError("pressure: give pressure_hpa or barometer_mmhg, not both", "pressure_hpa", "barometer_mmhg")
+    uncertainties = (u_pressure_hpa, u_barometer_mmhg, u_mercury_c)
+    stated = any(np.any(np.asarray(u, dtype=float) > 0.0) for u in uncertainties)
     of_mercury = {
         "mercury_c": mercury_c,
         "gravity": gravity,
@@ -135,7 +139,7 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
             if np.any(np.asarray(u, dtype=float) > 0.0):
                 raise ArgumentError(f"{name} belongs to barometer_mmhg, not to pressure_hpa", name, *PRESSURES)
         assert pressure_hpa is not None
-        return Pressure(pressure_hpa, u_pressure_hpa)
+        return Pressure(pressure_hpa, u_pressure_hpa, stated=stated)
     place = [latitude_deg is not None, elevation_m is not None]
     if mercury_c is None or not (all(place) if gravity is None else not any(place)):
         raise ArgumentError(
@@ -146,7 +150,7 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
     read_so = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
     value, u = station_pressure(barometer_mmhg, mercury_c, **where, **read_so)
     u_formula = station_pressure(barometer_mmhg, mercury_c, **where)[1]
-    return Pressure(value, np.hypot(u_pressure_hpa, u), u_formula)
+    return Pressure(value, np.hypot(u_pressure_hpa, u), u_formula, stated)
 
 
 @dataclass(frozen=True)

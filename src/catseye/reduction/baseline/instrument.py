@@ -6,7 +6,7 @@ Signs: observed = (1 + scale) D + zero + cyclic. An instrument that reads too mu
 the standard adds to readings is -zero.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypedDict
 
 import numpy as np
@@ -15,63 +15,17 @@ from threadpoolctl import threadpool_limits
 from catseye.aliases import Progress
 from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE, PPM
-from catseye.errors import EstimationError, InputError
+from catseye.errors import ArgumentError, EstimationError, InputError
 from catseye.estimation.baseline.adjustment import CEILING, BaselineSolution
 from catseye.estimation.baseline.iso17123 import FullTest
 from catseye.estimation.baseline.model import KnownPlaces
 from catseye.records.files.refusal import shown
 from catseye.records.laboratory.baseline import Baseline, BaselineShots, Heights, numbers_of
 from catseye.reduction.baseline.job import BaselineJob
-from catseye.reduction.baseline.lengths import BaselineSettings, Lengths, reduce_lengths
-from catseye.reduction.baseline.statistical_tests import FOLLOWS, SuspectShot, decisions_of
-from catseye.reduction.calibrations.check_outcome import CheckOutcome
-
-
-@dataclass(frozen=True, eq=False)
-class BaselineCalibration:
-    """Result of a baseline's calibration: pillars, instrument, tests.
-
-    observations   as read
-    settings       assumptions
-    names          of the pillars, by their numbers
-    heights        (n,) m, or None
-    reference_height   m, or None
-    lengths        of all shots
-    keep           (m,) the shots used
-    solution       of those
-    test           the full test procedure with the sets' means, or the reason against it
-    all_shots      the same with each shot as a single distance: its s is comparable with other sheets
-    against        the known baseline, or None
-    decisions      tests
-    suspects       shots and sets rejected by the tests
-    rejected       (m,) reason that a shot was left out, "" for the others
-    cyclic         names of the cyclic terms; empty where left out
-    weather        share of the weather's changes in the measured lengths, and its u: 1 expected
-    notes          for the user
-    """
-
-    observations: BaselineShots
-    settings: BaselineSettings
-    names: tuple[str, ...]
-    heights: np.ndarray | None
-    reference_height: float | None
-    lengths: Lengths
-    keep: np.ndarray
-    solution: BaselineSolution
-    test: FullTest | str
-    all_shots: FullTest | None
-    against: Baseline | None
-    decisions: tuple[CheckOutcome, ...]
-    suspects: tuple[SuspectShot, ...]
-    rejected: tuple[str, ...]
-    cyclic: tuple[str, ...]
-    weather: tuple[float, float]
-    notes: tuple[str, ...]
-
-    @property
-    def order(self) -> np.ndarray:
-        """Numbers (n,) of the pillars along the line."""
-        return np.argsort(self.solution.x, kind="stable")
+from catseye.reduction.baseline.lengths import reduce_lengths
+from catseye.reduction.baseline.result import BaselineCalibration
+from catseye.reduction.baseline.settings import BaselineSettings
+from catseye.reduction.baseline.statistical_tests import FOLLOWS, decisions_of
 
 
 def calibrate_baseline(
@@ -134,26 +88,26 @@ def _calibrated(
         share = np.mean((lengths.first / shots.slope)[keep]) / PPM
         notes.append(
             f"the lengths did not follow the weather: if they were corrected in the field, all are wrong by "
-            f"{share:+.1f} ppm in the mean, which no u here includes; compare with --corrected"
+            f"{share:+.1f} ppm in the mean, which no u here includes; compare with lengths taken as corrected"
         )
     return BaselineCalibration(
-        shots,
-        settings,
-        shots.names,
-        height if heights is not None else None,
-        reference,
-        lengths,
-        keep,
-        solution,
-        test,
-        all_shots,
-        against,
-        decisions,
-        suspects,
-        rejected,
-        cyclic,
-        weather,
-        tuple(notes),
+        observations=shots,
+        settings=settings,
+        names=shots.names,
+        heights=height if heights is not None else None,
+        reference_height=reference,
+        lengths=lengths,
+        keep=keep,
+        solution=solution,
+        test=test,
+        all_shots=all_shots,
+        against=against,
+        decisions=decisions,
+        suspects=suspects,
+        rejected=rejected,
+        cyclic=cyclic,
+        weather=weather,
+        notes=tuple(notes),
     )
 
 
@@ -208,7 +162,8 @@ def _heights(
     n = len(shots.names)
     if heights is None:
         if settings.reference_height is not None:
-            raise InputError("--reference-height-m needs --heights: no reference without heights")
+            text = "reference_height_m needs heights: no reference without heights"
+            raise ArgumentError(text, "reference_height_m", "heights")
         notes.append("no heights of pillars: taken as level, which makes lengths on a slope too long")
         return np.zeros(n), np.zeros(n), None
     touched = {shots.names[i] for i in (*shots.start, *shots.end)}
@@ -218,10 +173,11 @@ def _heights(
     reference = settings.reference_height
     if against is not None:
         if reference is not None and reference != against.reference_height_m:
-            raise InputError(
-                f"--reference-height-m {reference:g} is not the known baseline's "
-                f"({against.reference_height_m}); leave it out"
+            text = (
+                f"reference_height_m {reference:g} is not the known baseline's ({against.reference_height_m}); "
+                "leave it out"
             )
+            raise ArgumentError(text, "reference_height_m")
         reference = against.reference_height_m
         if reference is None:
             notes.append("the known baseline has no heights: distances are compared at the first pillar's height")
@@ -250,7 +206,7 @@ def _notes(
         if not np.isfinite(shots.direction).any():
             notes.append("no horizontal directions: the pillars are assumed to be in a straight line")
     if settings.unit_length is None:
-        notes.append("no cyclic terms: the instrument's unit length is missing (--unit-length-m)")
+        notes.append("no cyclic terms: the instrument's unit length is missing")
     if not np.isfinite(solution.u_noise[1:]).any():
         notes.append("too few redundant sets to estimate the noise: the maker's claim is used")
     elif solution.noise.air * float(np.max(solution.used.distance)) ** 2 > 4.0 * (solution.noise.set + 1e-12):

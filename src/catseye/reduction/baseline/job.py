@@ -21,7 +21,8 @@ from catseye.estimation.baseline.adjustment import (
 from catseye.estimation.baseline.iso17123 import FullTest, full_test
 from catseye.estimation.baseline.model import BaselineSights, Claim, Extra, KnownPlaces
 from catseye.records.laboratory.baseline import BaselineShots
-from catseye.reduction.baseline.lengths import BaselineSettings, Lengths
+from catseye.reduction.baseline.lengths import Lengths
+from catseye.reduction.baseline.settings import BaselineSettings
 from catseye.reduction.baseline.statistical_tests import SuspectShot, suspects_of
 
 
@@ -48,22 +49,21 @@ class BaselineJob:
         count = len(shots.names)
         u_direction = np.hypot(shots.u_rounding, settings.u_direction_arcsec * ARCSECOND)
         self.sights = BaselineSights(
-            shots.start,
-            shots.end,
-            shots.set,
-            shots.setup,
-            lengths.distance,
-            lengths.stretch,
-            lengths.systematic,
-            lengths.effects,
-            shots.direction,
-            u_direction,
+            start=shots.start,
+            end=shots.end,
+            set=shots.set,
+            setup=shots.setup,
+            distance=lengths.distance,
+            stretch=lengths.stretch,
+            systematic=lengths.systematic,
+            effects=lengths.effects,
+            direction=shots.direction,
+            u_direction=u_direction,
+            pillars=shots.names,
         )
         if known is None:
-            try:
-                self.x = places_in_line(shots.start.tolist(), shots.end.tolist(), lengths.distance, count=count)
-            except EstimationError as problem:
-                raise EstimationError(named(str(problem), shots.names)) from problem
+            ends = shots.start.tolist(), shots.end.tolist()
+            self.x = places_in_line(*ends, lengths.distance, count=count, names=shots.names)
             self.y = np.zeros(count)
         else:
             self.x, self.y = known.x, known.y
@@ -74,20 +74,16 @@ class BaselineJob:
         With further unknowns, the noise estimated or as an argument.
         """
         part = None if extra is None else Extra(extra.names, extra.columns[keep])
-        try:
-            return adjust_baseline(
-                self.sights.only(keep),
-                self.x,
-                self.y,
-                known=self.known,
-                scale=self.known is not None,
-                extra=part,
-                before=BaselineNoise(
-                    u_centring=self.settings.u_centring_mm * MILLIMETRE, noise=noise, claim=self._specified(keep)
-                ),
-            )
-        except EstimationError as problem:
-            raise EstimationError(named(str(problem), self.shots.names)) from problem
+        centring = self.settings.u_centring_mm * MILLIMETRE
+        return adjust_baseline(
+            self.sights.only(keep),
+            self.x,
+            self.y,
+            known=self.known,
+            scale=self.known is not None,
+            extra=part,
+            before=BaselineNoise(u_centring=centring, noise=noise, claim=self._specified(keep)),
+        )
 
     def _specified(self, keep: np.ndarray) -> Claim:
         """Maker's claim as variances.
@@ -245,13 +241,3 @@ class BaselineJob:
             return float("nan"), float("nan")
         b, u = extended.of("weather")
         return 1.0 - b, u
-
-
-def named(text: str, names: tuple[str, ...]) -> str:
-    """Text with pillars' names for their numbers."""
-    import re
-
-    def name(m: re.Match[str]) -> str:
-        return f"pillar {names[int(m[1])]}" if m[1] else f"{m[2]} of {names[int(m[3])]}"
-
-    return re.sub(r"pillar number (\d+)|\b([xy]) (\d+)\b", name, text)  # once: names may look like numbers

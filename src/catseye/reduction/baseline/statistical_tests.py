@@ -12,7 +12,7 @@ from catseye.reduction.calibrations.check_outcome import CheckOutcome
 
 if TYPE_CHECKING:
     from catseye.records.laboratory.baseline import Baseline
-    from catseye.reduction.baseline.lengths import BaselineSettings
+    from catseye.reduction.baseline.settings import BaselineSettings
 
 FOLLOWS = "the light follows the weather as read"
 ALIKE = 0.99  # correlation of standardised residuals that makes errors of two sets inseparable

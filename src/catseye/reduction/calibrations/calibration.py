@@ -9,7 +9,9 @@ import numpy as np
 
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit
+from catseye.verdict import Verdict
 
+MOST_NAMED = 8  # suspect readings that a verdict names
 STATE = "state"  # last column of a table of readings: used, suspect, rejected, or left out with a reason
 Cell = str | int | float  # of a table of readings
 RecordValue = str | float | list[str] | list[float] | dict[str, float]  # a dict where several records have a part
@@ -85,6 +87,28 @@ class Calibration:
     def states(self) -> tuple[str, ...]:
         """State of each reading; empty where the rows are results."""
         return tuple(str(row[-1]) for row in self.rows) if self.columns and self.columns[-1] == STATE else ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict from the calibration's own tests; failed tests are named."""
+        off = sorted((o for o in self.plausible if o.passed is False), key=lambda o: not o.grave)
+        if off and off[0].grave:
+            return Verdict("failed", off[0].text)
+        failed = [decision for decision in self.decisions if decision.passed is False]
+        if any(decision.grave for decision in failed):
+            plural = "s" if len(failed) > 1 else ""
+            names = "; ".join(decision.name for decision in failed)
+            return Verdict("failed", f"{len(failed)} of its own test{plural} failed: {names}")
+        if off or failed:
+            return Verdict("doubtful", "; ".join(outcome.text for outcome in (*failed, *off)))
+        if self.degrees_of_freedom < 1 and not any(d.passed for d in self.decisions):
+            return Verdict("doubtful", "no redundancy: nothing was measured twice and no test is possible")
+        suspects = [number for number, state in enumerate(self.states, start=1) if state == "suspect"]
+        if suspects:
+            named = ", ".join(map(str, suspects[:MOST_NAMED])) + (" ..." if len(suspects) > MOST_NAMED else "")
+            return Verdict("doubtful", f"suspect readings: {named}")
+        passed = sum(decision.passed is True for decision in self.decisions)
+        return Verdict("good", f"its own tests passed ({passed})" if passed else "no test failed")
 
     def value(self, key: str) -> float:
         """Quantity with that key; KeyError without one."""

@@ -130,7 +130,7 @@ def quantities(
         least = np.array([np.min(fit.effective[row != 0.0], initial=np.inf) for row in slope])
         coverage = student(least * (variance / np.maximum(estimated, 1e-300)) ** 2, 2.0)
     return tuple(
-        Quantity(key, float(v), float(np.sqrt(s)), unit, meaning, float(k))
+        Quantity(key=key, value=float(v), u=float(np.sqrt(s)), unit=unit, meaning=meaning, coverage=float(k))
         for (key, unit, meaning), v, s, k in zip(keys, values, variance, coverage, strict=True)
     )
 

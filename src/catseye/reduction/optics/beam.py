@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,8 +20,10 @@ from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import InputError, ValidityError
 from catseye.optics import abcd, coating, detector, gaussian_beam, glass, isolator, receiver
+from catseye.records.files.reading import Folder
 from catseye.records.site.beam import BeamElement, BeamTrain, Laser
 from catseye.signal.systematics.feedback import fringe_contrast
+from catseye.verdict import Verdict
 
 WIDE = 5.0  # beam radii: size of a missing aperture
 UNCLIPPED = 1e-5  # of the power lost: the beam then stays Gaussian, to 1e-3 of a share, 5e-3 through a pinhole
@@ -94,6 +97,30 @@ class BeamPath:
     range_effects: dict[str, float]
     u_image: float
     laser: dict[str, float]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Good where the power is known at every distance."""
+        if self.status != "ok":
+            return Verdict("doubtful", self.status)
+        failures = [row for row in self.returned if row.status != "ok"]
+        if failures:
+            distances = ", ".join(f"{row.distance:g}" for row in failures)
+            return Verdict("doubtful", f"no power from {distances} m: {failures[0].status}")
+        return Verdict("good", "every element passes the beam")
+
+
+def read_beam(file: Path, distance: float | None = None) -> tuple[BeamPath, dict[str, str]]:
+    """Beam train of a file, reduced, and the file's hash.
+
+    file       the record
+    distance   m, overrides the record's
+    """
+    folder = Folder(file.parent)
+    train = folder.record(file.name, BeamTrain)
+    if distance is not None:
+        train = train.model_copy(update={"distance_m": distance})
+    return reduce_beam(train), folder.hashes
 
 
 def reduce_beam(train: BeamTrain) -> BeamPath:
@@ -236,7 +263,16 @@ def _outward(train: BeamTrain) -> tuple[NDArray[np.complex128], tuple[BeamPlace,
         clipped, passed_share = 1.0 - passed / passed_share, passed
         power *= (1.0 - clipped) * _transmission(train, element)
         places.append(
-            BeamPlace("outward", _called(element), path, w, abcd.wavefront_curvature(q), edge, clipped, power)
+            BeamPlace(
+                leg="outward",
+                name=_called(element),
+                way=path,
+                radius=w,
+                curvature=abcd.wavefront_curvature(q),
+                aperture=edge,
+                clipped=clipped,
+                power=power,
+            )
         )
         q, path = abcd.onward(q, _matrices(train, element)), path + _length(element)
     return q, tuple(places), power
@@ -254,7 +290,14 @@ def _returned(
     power *= hit * train.reflector.reflectance
     places = [
         BeamPlace(
-            "reflector", train.reflector.name or "reflector", path, w, abcd.wavefront_curvature(q), face, 1 - hit, power
+            leg="reflector",
+            name=train.reflector.name or "reflector",
+            way=path,
+            radius=w,
+            curvature=abcd.wavefront_curvature(q),
+            aperture=face,
+            clipped=1 - hit,
+            power=power,
         )
     ]
     system, path, passed_share = np.broadcast_to(space, (2, 2, 2)), path + distance, 1.0
@@ -291,10 +334,23 @@ def _returned(
                 (abcd.radius(beam, light), abcd.wavefront_curvature(beam)) if unclipped else (np.full(2, np.nan),) * 2
             )
             leg = "detector" if ending else "inward"
-            places.append(BeamPlace(leg, _called(element), path, size, bend, edge, clipped, power))
+            places.append(
+                BeamPlace(
+                    leg=leg,
+                    name=_called(element),
+                    way=path,
+                    radius=size,
+                    curvature=bend,
+                    aperture=edge,
+                    clipped=clipped,
+                    power=power,
+                )
+            )
         power *= element.transmission if element.kind == "space" else 1.0
         system, past_stop, path = step @ system, step @ past_stop, path + _length(element)
-    return Returned(distance, w, hit, float(passed_share), float(power), status), tuple(places)
+    return Returned(
+        distance=distance, radius=w, hit=hit, collected=float(passed_share), power=float(power), status=status
+    ), tuple(places)
 
 
 def beam_profile(train: BeamTrain, points: int = 60) -> dict[str, tuple[Array, Array]]:

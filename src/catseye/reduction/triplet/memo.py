@@ -92,7 +92,19 @@ def memo_numbers(r: TripletReadings, cycles: TripletCycles, lengths: TripletLeng
     with np.errstate(invalid="ignore", divide="ignore"):
         own_sine = (own_2 - own_1) * (own_2 + own_1) / (2.0 * r.d_12 * d_0)
         h_corr_by_int = reduced(own_1, own_2, own_b, n_1, own_sine)[2]
-    return MemoNumbers(n_1, n_2, n_bc, d_mp, d_0, i_1, i_2, psi, delta_range, h_corr, h_corr_by_int)
+    return MemoNumbers(
+        n_1=n_1,
+        n_2=n_2,
+        n_bc=n_bc,
+        d_mp=d_mp,
+        d_0=d_0,
+        i_1=i_1,
+        i_2=i_2,
+        psi=psi,
+        delta_range=delta_range,
+        h_corr=h_corr,
+        h_corr_by_int=h_corr_by_int,
+    )
 
 
 def _by_int(coarse: Array, phase: Array, half: Array) -> Array:

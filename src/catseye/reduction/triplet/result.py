@@ -11,8 +11,10 @@ from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.geometry import TripletCycles, TripletLengths, TripletReadings
 from catseye.reduction.triplet.memo import MemoNumbers
 from catseye.reduction.triplet.plate import PlatePoints
+from catseye.verdict import Verdict
 
 TOLERANCE = 0.15e-3  # m, the memo's limit of |H_corr - L_MPBC|
+LIKELY = 0.95  # least probability of conformity of an undoubted acceptance
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +80,21 @@ class TripletReduction:
     u_agreeing_ratio: float
     status: tuple[str, ...]
     notes: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict by the memo's limit and the probability of conformity."""
+        if not math.isfinite(self.difference):
+            return Verdict("failed", "no placement gave a height to compare with the surface plate's")
+        limit = f"{1e3 * abs(self.difference):.3f} mm against a limit of {1e3 * TOLERANCE:.2f}"
+        chance = self.conformity_probability
+        if not self.accepted:
+            return Verdict("failed", f"not accepted: the two heights differ by {limit}")
+        if math.isfinite(chance) and chance < LIKELY:
+            return Verdict("doubtful", f"accepted, but its probability of conformity is {chance:.2f} ({limit})")
+        if self.suspects:
+            return Verdict("doubtful", f"accepted, with suspect placements ({limit})")
+        return Verdict("good", f"accepted: the two heights differ by {limit}")
 
 
 def conformity_probability(difference: float, u: float, tolerance: float = TOLERANCE) -> float:

@@ -204,7 +204,14 @@ def triplet_sensitivities(
             telescope_error(d, scan_point=ahead, h_error=e) + d.ball_excess for d, e in zip(departures, h, strict=True)
         ]
         rows.append(
-            LargestEffects(cause, size, memo, float(np.abs(h).max()), float(max(used)), float(np.abs(tie).max()))
+            LargestEffects(
+                cause=cause,
+                size=size,
+                memo=memo,
+                calibration=float(np.abs(h).max()),
+                use=float(max(used)),
+                tie=float(np.abs(tie).max()),
+            )
         )
     return tuple(rows)
 

@@ -200,14 +200,32 @@ def combined(values: Array, covariance: Array, used: NDArray[np.intp]) -> Combin
 
     weights, residuals, statistics = np.zeros(len(values)), *(np.full(len(values), np.nan) for _ in range(2))
     if not len(used):
-        return Combined(math.nan, weights, residuals, statistics, math.nan, 0, math.nan, ())
+        return Combined(
+            value=math.nan,
+            weights=weights,
+            residuals=residuals,
+            statistics=statistics,
+            chi_square=math.nan,
+            degrees_of_freedom=0,
+            p=math.nan,
+            suspects=(),
+        )
     weights[used], inverse = _weights(covariance, used)
     value = float(weights[used] @ values[used])
     deviation = values[used] - value
     residuals[used] = deviation
     degrees = len(used) - 1
     if not degrees:
-        return Combined(value, weights, residuals, statistics, 0.0, 0, math.nan, ())
+        return Combined(
+            value=value,
+            weights=weights,
+            residuals=residuals,
+            statistics=statistics,
+            chi_square=0.0,
+            degrees_of_freedom=0,
+            p=math.nan,
+            suspects=(),
+        )
     chi_square = float(deviation @ inverse @ deviation)
     statistics[used] = _standardised(values, covariance, used)
     limit = -float(ndtri(0.5 * LEVEL / len(used)))
@@ -222,7 +240,16 @@ def combined(values: Array, covariance: Array, used: NDArray[np.intp]) -> Combin
         unsuspected = np.delete(unsuspected, worst)
         w = _standardised(values, covariance, unsuspected)
     p = float(chdtrc(degrees, chi_square))
-    return Combined(value, weights, residuals, statistics, chi_square, degrees, p, tuple(sorted(suspects)))
+    return Combined(
+        value=value,
+        weights=weights,
+        residuals=residuals,
+        statistics=statistics,
+        chi_square=chi_square,
+        degrees_of_freedom=degrees,
+        p=p,
+        suspects=tuple(sorted(suspects)),
+    )
 
 
 def _weights(covariance: Array, used: NDArray[np.intp]) -> tuple[Array, Array]:

@@ -225,7 +225,7 @@ def ball_ranges(
         rows = slice(i * k, (i + 1) * k)
         total[rows, rows] += part @ part.T
     total[~solved], total[:, ~solved] = np.nan, np.nan
-    return BallRanges(incidence, obliquity, d_mp, d_bc, memo, total)
+    return BallRanges(incidence=incidence, obliquity=obliquity, d_mp=d_mp, d_bc=d_bc, d_bc_memo=memo, covariance=total)
 
 
 def incidence_on_prisms(unit: MountedTriplet, scan_points: ArrayLike) -> tuple[Array, Array]:

@@ -207,13 +207,13 @@ def geometry_of(sights: DirectionSights, azimuth_z: float, changed: SightConditi
 def star_of(entry: CataloguedStar) -> Star:
     """Star of a sheet's entry, in radians and arcseconds."""
     return Star(
-        entry.name,
-        entry.ra_deg * DEGREE,
-        entry.dec_deg * DEGREE,
-        entry.motion_ra_mas * 1e-3 * ARCSECOND,
-        entry.motion_dec_mas * 1e-3 * ARCSECOND,
-        entry.parallax_mas * 1e-3,
-        entry.radial_velocity_km_s,
+        name=entry.name,
+        right_ascension=entry.ra_deg * DEGREE,
+        declination=entry.dec_deg * DEGREE,
+        motion_ra=entry.motion_ra_mas * 1e-3 * ARCSECOND,
+        motion_dec=entry.motion_dec_mas * 1e-3 * ARCSECOND,
+        parallax_arcsec=entry.parallax_mas * 1e-3,
+        radial_velocity_km_s=entry.radial_velocity_km_s,
     )
 
 

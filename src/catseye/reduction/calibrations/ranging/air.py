@@ -104,6 +104,11 @@ def sensor_effects(readings: SheetReadings, columns: np.ndarray) -> list[Effect]
     ]
 
 
+def formula_effect(state: CalibrationAir, path: np.ndarray) -> Effect:
+    """Effect of the formula for the group index on the path (m,) m."""
+    return Effect("formula for the group index", path / state.index, state.u_model)
+
+
 def ranger_effects(readings: SheetReadings, state: CalibrationAir, path: np.ndarray) -> list[Effect]:
     """Effects of frequency, formula and sensors on the path (m,) m.
 
@@ -115,6 +120,6 @@ def ranger_effects(readings: SheetReadings, state: CalibrationAir, path: np.ndar
     stretch = path / state.index
     return [
         Effect("frequency of the modulation, ppm", path * PPM, readings.sheet.u_modulation_ppm),
-        Effect("formula for the group index", stretch, state.u_model),
+        formula_effect(state, path),
         *sensor_effects(readings, state.slopes * stretch),
     ]

@@ -13,10 +13,10 @@ from catseye.reduction.calibrations.fit import Effect, ObservedScatter
 from catseye.reduction.calibrations.ranging.air import (
     WEATHER,
     AirSheet,
+    formula_effect,
     group_air,
     half_wavelength,
     phase_air,
-    ranger_effects,
     sensor_effects,
 )
 
@@ -97,7 +97,7 @@ def rail_of(readings: SheetReadings) -> Rail:
     range_ = readings.get("range_m")
     path = range_ - (sheet.d0_mm + sheet.pc_mm) * MILLIMETRE
     half = half_wavelength(readings, group)
-    effects = [e for e in ranger_effects(readings, group, path) if not e.name.startswith(("offset", "frequency"))]
+    effects = [formula_effect(group, path)]  # the sensors follow
     stretch = group.slopes * path / group.index  # per sensor: ranger reads long by it
     if ("interferometer_m" in readings.numbers) == ("interferometer_vacuum_m" in readings.numbers):
         raise refusal(readings.file, "line 1, expected one of the columns interferometer_m and interferometer_vacuum_m")
