@@ -148,14 +148,13 @@ def reduce(
     >>> night.x.shape, night.verdict.word
     ((130, 3), 'good')
     """
-    from catseye.gateways.epoch.summary import verdict
     from catseye.reduction.epoch.epoch import reduce_epoch
     from catseye.reduction.epoch.settings import ReductionSettings
 
     reduction = reduce_epoch(campaign_of(campaign), ReductionSettings(air_model=air_model), progress)
     coordinates = reduction.coordinates
     return NightResult(
-        verdict(reduction),
+        reduction.verdict,
         tuple(coordinates.points),
         coordinates.x,
         coordinates.u,
@@ -265,7 +264,6 @@ def explain(
 
     Raises InputError for an unknown shot.
     """
-    from catseye.gateways.epoch.explain import explanation_verdict
     from catseye.reduction.budget.explanation import explain_shot
     from catseye.reduction.epoch.settings import ReductionSettings
 
@@ -273,7 +271,7 @@ def explain(
     settings = ReductionSettings(air_model=air_model)
     found = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
     return ExplanationResult(
-        explanation_verdict(found),
+        found.verdict,
         found.shot,
         found.ranger,
         found.target,

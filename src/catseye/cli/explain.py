@@ -65,9 +65,7 @@ def explain(  # noqa: PLR0913 - its options are its command line
     elif not quiet:
         _tell(explanation, page)
     if strict:
-        from catseye.gateways.epoch.explain import explanation_verdict
-
-        judge(explanation_verdict(explanation), strict=strict)
+        judge(explanation.verdict, strict=strict)
 
 
 def _page(page: Path | None) -> AbstractContextManager[list[str]]:
@@ -89,9 +87,9 @@ def _page_of(explanation: "Explanation", night: "Campaign") -> str:
 
 
 def _tell(explanation: "Explanation", page: Path | None) -> None:
-    from catseye.gateways.epoch.explain import budget_lines, explanation_passages, explanation_verdict
+    from catseye.gateways.epoch.explain import budget_lines, explanation_passages
 
-    say(wrapped("Verdict", explanation_verdict(explanation).text))
+    say(wrapped("Verdict", explanation.verdict.text))
     for passage in explanation_passages(explanation):
         say(wrapped(passage.title, passage.text))
     lines = budget_lines(explanation)

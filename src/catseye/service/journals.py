@@ -18,9 +18,9 @@ from catseye.coordinator.journal.check import ChainReport, has_head, parted, ver
 from catseye.coordinator.journal.place import place_of, refuse_foreign
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.recovery import recover
+from catseye.coordinator.journal.verdict import export_verdict
 from catseye.errors import InputError
 from catseye.gateways.journal.campaign import export_campaign
-from catseye.gateways.journal.chain import export_verdict
 from catseye.gateways.journal.export import export_tables
 from catseye.interruption import Unfinished, undo_on_interruption
 from catseye.verdict import Verdict

@@ -39,7 +39,8 @@ def check(
     quiet: Quiet = False,
 ) -> None:
     """Hold each event against the chain of hashes: changed, missing, put in, another history, and from where on."""
-    from catseye.gateways.journal.chain import chain_object, chain_verdict, chain_words
+    from catseye.coordinator.journal.verdict import chain_verdict
+    from catseye.gateways.journal.chain import chain_object, chain_words
     from catseye.service.journals import checked
 
     progress = ProgressLine(quiet)
@@ -71,7 +72,8 @@ def backup(
     quiet: Quiet = False,
 ) -> None:
     """Copy a journal, also one that is being written, whole or not at all; the copy is checked."""
-    from catseye.gateways.journal.chain import chain_object, chain_verdict, chain_words
+    from catseye.coordinator.journal.verdict import chain_verdict
+    from catseye.gateways.journal.chain import chain_object, chain_words
     from catseye.service.journals import copied
 
     progress = ProgressLine(quiet)

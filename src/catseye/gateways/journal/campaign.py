@@ -21,8 +21,9 @@ from catseye.constants import DEGREE
 from catseye.coordinator.journal.check import ChainReport
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, StoredAnswer
 from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.verdict import export_verdict
 from catseye.errors import InputError
-from catseye.gateways.journal.chain import chain_object, export_verdict
+from catseye.gateways.journal.chain import chain_object
 from catseye.gateways.journal.export import seal, stamp
 from catseye.gateways.journal.motion import JournalMotion, MotionRows
 from catseye.gateways.writers.output import atomic_directory
