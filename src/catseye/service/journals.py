@@ -13,6 +13,7 @@ from typing import Any, Literal
 from urllib.parse import quote
 
 from catseye.aliases import Progress
+from catseye.coordinator.journal.campaign import journal_campaign
 from catseye.coordinator.journal.chain import Head
 from catseye.coordinator.journal.check import ChainReport, has_head, parted, verify_run
 from catseye.coordinator.journal.place import place_of, refuse_foreign
@@ -20,7 +21,7 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.recovery import recover
 from catseye.coordinator.journal.verdict import export_verdict
 from catseye.errors import InputError
-from catseye.gateways.journal.campaign import export_campaign
+from catseye.gateways.journal.campaign import write_campaign
 from catseye.gateways.journal.export import export_tables
 from catseye.interruption import Unfinished, undo_on_interruption
 from catseye.verdict import Verdict
@@ -218,9 +219,10 @@ def exported(
             chain.bad -= chain.unvouched
         if form == "campaign":
             progress("writing the campaign", 0, 1)
-            written = export_campaign(reader, out, run=number, span=span, chain=chain)
-            counts = {"shots": written.shots, "weather": written.readings}
-            return ExportOutcome(number, chain, counts, (*notes, *written.notes), written.verdict.hearing(notes))
+            campaign = journal_campaign(reader, number, span=span, chain=chain)
+            write_campaign(campaign, out)
+            counts = {"shots": len(campaign.shots), "weather": len(campaign.readings)}
+            return ExportOutcome(number, chain, counts, (*notes, *campaign.notes), campaign.verdict.hearing(notes))
         counts = export_tables(reader, out, runs=[number], forms=[form], span=span, progress=progress, chains=[chain])
         return ExportOutcome(number, chain, counts, notes, export_verdict(chain, sum(counts.values()), notes))
 

@@ -27,6 +27,7 @@ from catseye.gateways.writers.cells import harmless
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.output import PROVENANCE, atomic_directory
 from catseye.gateways.writers.written import origin
+from catseye.ranger.line import stamp_text
 from catseye.records.files.verdicts import EXPORT
 from catseye.records.night.live import TICKS_PER_DAY
 
@@ -235,22 +236,12 @@ def rows_of(
             ticks = ticks_of(entry)
             if span is None or span[0] <= ticks < span[1]:
                 for row in table.rows(entry):
-                    yield run, seq, stamp(ticks), *row
+                    yield run, seq, stamp_text(ticks), *row
 
 
 def ticks_of(entry: Entry) -> int:
     """Time of an entry, ticks."""
     return entry.shot.ticks if hasattr(entry, "shot") else entry.ticks
-
-
-def stamp(ticks: int) -> str:
-    """MJD with the eight decimals of a tick, exact.
-
-    >>> stamp(5288912500001)
-    '52889.12500001'
-    """
-    day, fraction = divmod(ticks, TICKS_PER_DAY)
-    return f"{day}.{fraction:08d}"
 
 
 def seal(directory: Path, reader: JournalReader, provenance: dict[str, Any]) -> None:
