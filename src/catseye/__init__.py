@@ -14,6 +14,7 @@ from catseye.errors import ArgumentError, CatseyeError, EstimationError, FrameEr
 from catseye.version import __version__
 
 if TYPE_CHECKING:
+    from catseye.api.journal import backup_journal, check_journal, export
     from catseye.api.laboratory import baseline, calibrate, triplet
     from catseye.api.living import replay, simulate
     from catseye.api.network import adjust, compare, locate, plan
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 FACE = {  # file of catseye.api -> its exported names
     "laboratory": ("baseline", "calibrate", "triplet"),
+    "journal": ("backup_journal", "check_journal", "export"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare", "locate", "plan"),
     "night": ("explain", "night", "reduce"),
@@ -48,12 +50,15 @@ __all__ = [
     "__version__",
     "adjust",
     "air",
+    "backup_journal",
     "baseline",
     "beam",
     "calibrate",
+    "check_journal",
     "compare",
     "examples",
     "explain",
+    "export",
     "glass",
     "link",
     "load",

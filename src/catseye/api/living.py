@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from catseye.aliases import Progress
-from catseye.api.reading import DATABASES, place_of
+from catseye.api.journal import journal_place, run_of
+from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.errors import InputError
@@ -200,16 +201,12 @@ def replay(
 
     Raises InputError: no such journal, run or folder; a run that holds no epoch.
     """
-    from catseye.coordinator.journal.reader import JournalReader
-    from catseye.service.replay import replay_verdict, replayed
+    from catseye.service.replay import replayed
 
-    place = journal.place if isinstance(journal, JournalReader) else str(journal)
-    if not place.startswith(DATABASES):
-        place = str(place_of(place))
     other = None if calibrations is None else place_of(calibrations)
-    outcome = replayed(place, run, other, progress=progress or (lambda what, done, total: None))
+    outcome = replayed(journal_place(journal), run_of(run), other, progress=progress or (lambda *_: None))
     return ReplayResult(
-        verdict=replay_verdict(outcome),
+        verdict=outcome.verdict,
         same=outcome.same,
         identical=outcome.identical,
         shots=outcome.shots,
