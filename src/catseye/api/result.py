@@ -45,9 +45,7 @@ class Result:
 
     def to_json(self) -> str:
         """JSON object of the command, on one line."""
-        from catseye.gateways.writers.objects import json_line
-
-        return json_line(self.to_object())
+        return json_text(self.to_object())
 
     def tables(self) -> "dict[str, QTable]":
         """Every table of the answer by its name, the main one first; columns have units where they have one."""
@@ -195,6 +193,13 @@ def quantities(columns: "Mapping[str, tuple[Any, str]]", **meta: Any) -> "QTable
         },
         meta=meta,
     )
+
+
+def json_text(value: Any) -> str:
+    """JSON text on one line; NaN and infinity become null."""
+    from catseye.gateways.writers.objects import json_line
+
+    return json_line(value)
 
 
 def digest_of(path: Path) -> str:

@@ -211,7 +211,7 @@ def exported(
         if chain.count and not damaged:
             raise InputError(
                 f"journal {reader.place}: run {number} fails verification: {chain.problems[0]} (use its "
-                "backup, or --damaged to skip altered entries)"
+                "backup, or export it as damaged, without altered entries)"
             )
         if notes and chain.unvouched:  # explained by lost pages with links or samples, not by insertion
             count = len(chain.unvouched)

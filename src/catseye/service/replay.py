@@ -315,7 +315,7 @@ def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
     largest = [pair for pair in furthest[:SHOWN_POINTS] if pair[1].largest_mm >= LEAST_SHOWN_MM]
     passages += [(name, _point_words(m)) for name, m in largest]
     if len(furthest) > len(largest):
-        passages.append(("And", f"{len(furthest) - len(largest)} more points with smaller changes (see --json)."))
+        passages.append(("And", f"{len(furthest) - len(largest)} more points with smaller changes (in the JSON)."))
     return passages
 
 

@@ -272,5 +272,5 @@ def budget_lines(explanation: Explanation) -> list[str]:
     if small:
         size = float(np.sqrt(np.sum(budget.contribution[small] ** 2))) / MICROMETRE
         share = 100.0 * float(budget.share[small].sum())
-        lines.append(f"{share:7.2f} {size:7.2f}  {len(small)} smaller inputs (--json or --page)")
+        lines.append(f"{share:7.2f} {size:7.2f}  {len(small)} smaller inputs (JSON and page have them)")
     return [*lines, f"{100.0:7.2f} {budget.u / MICROMETRE:7.2f}  together"]
