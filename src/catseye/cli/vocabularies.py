@@ -10,6 +10,7 @@ import typer
 
 # atmosphere
 AIR_MODELS = "ciddor_hill1999|rueger1990|iag1999_closed|barrell_sears1963"
+AIR_MODEL = "rueger1990"  # of a reduction
 SOUND_MODELS = "parker2004|cramer1993|real_gas"
 THERMOMETRY_MODELS = "real_gas|cramer1993|parker2004"  # the one of choice first
 
