@@ -14,6 +14,16 @@ from catseye.errors import ArgumentError, CatseyeError, EstimationError, FrameEr
 from catseye.version import __version__
 
 if TYPE_CHECKING:
+    from catseye.api.figures import (
+        plot_aberration,
+        plot_air,
+        plot_beam,
+        plot_coating,
+        plot_polarization,
+        plot_return,
+        plot_servo,
+        plot_sky,
+    )
     from catseye.api.journal import backup_journal, check_journal, export
     from catseye.api.laboratory import baseline, calibrate, triplet
     from catseye.api.living import replay, simulate
@@ -28,6 +38,16 @@ if TYPE_CHECKING:
 
 FACE = {  # file of catseye.api -> its exported names
     "laboratory": ("baseline", "calibrate", "triplet"),
+    "figures": (
+        "plot_aberration",
+        "plot_air",
+        "plot_beam",
+        "plot_coating",
+        "plot_polarization",
+        "plot_return",
+        "plot_servo",
+        "plot_sky",
+    ),
     "journal": ("backup_journal", "check_journal", "export"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare", "locate", "plan"),
@@ -65,6 +85,14 @@ __all__ = [
     "locate",
     "night",
     "plan",
+    "plot_aberration",
+    "plot_air",
+    "plot_beam",
+    "plot_coating",
+    "plot_polarization",
+    "plot_return",
+    "plot_servo",
+    "plot_sky",
     "point",
     "pose",
     "reduce",

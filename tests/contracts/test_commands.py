@@ -245,12 +245,62 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
     assert done.stderr.strip() == "[]"
 
 
-ONE_CALL = ["air", "beam", "explain", "glass", "link", "night", "plan", "reduce", "replay", "safety", "sound"]
+ONE_CALL = [
+    "air",
+    "beam",
+    "examples",
+    "explain",
+    "export",
+    "glass",
+    "journal backup",
+    "journal check",
+    "link",
+    "night",
+    "plan",
+    "plot aberration",
+    "plot air",
+    "plot beam",
+    "plot coating",
+    "plot polarization",
+    "plot return",
+    "plot servo",
+    "plot sky",
+    "reduce",
+    "replay",
+    "safety",
+    "simulate",
+    "sound",
+]
+VERBS = ("plot",)  # groups whose name is the verb
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
+WRITERS = {"certificate", "template", "write", "write_stars"}  # files that are methods of the result
+OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
 
 
-@pytest.mark.parametrize("name", ONE_CALL)
-def test_function_takes_every_option_of_its_command(name):
-    command = next(each.callback for each in app.registered_commands if each.callback.__name__ == name)
-    options = set(inspect.signature(command).parameters) - OF_THE_TERMINAL
-    assert options <= set(inspect.signature(getattr(catseye_package, name)).parameters)
+def callbacks():
+    """Function of each command by its words; of a group's, "group command"."""
+    groups = [("", app), *((f"{group.name} ", group.typer_instance) for group in app.registered_groups)]
+    return {
+        prefix + (command.name or command.callback.__name__.replace("_", "-")): command.callback
+        for prefix, instance in groups
+        for command in instance.registered_commands
+    }
+
+
+def python_name(words):
+    """Function of catseye that is a command: `pointing fit` is `fit_pointing`, `plot sky` is `plot_sky`."""
+    parts = words.split()
+    return "_".join(parts if parts[0] in VERBS else reversed(parts)).replace("-", "_")
+
+
+def test_a_command_of_a_group_has_its_verb_first_in_python():
+    assert (python_name("air"), python_name("pointing fit")) == ("air", "fit_pointing")
+    assert set(ONE_CALL) <= set(callbacks())
+
+
+@pytest.mark.parametrize("words", ONE_CALL)
+def test_function_takes_every_option_of_its_command(words):
+    options = set(inspect.signature(callbacks()[words]).parameters) - OF_THE_TERMINAL - WRITERS
+    renamed = OTHER_NAMES.get(words, {})
+    arguments = set(inspect.signature(getattr(catseye_package, python_name(words))).parameters)
+    assert {renamed.get(option, option) for option in options} <= arguments

@@ -154,7 +154,7 @@ class JournalCheckResult(Result):
         return {"verdict": self.verdict.to_object(), "runs": runs, "against": list(self.differences)}
 
     def tables(self) -> "dict[str, QTable]":
-        """`runs`: a row a run."""
+        """`runs`: a row a run of the journal."""
         return {"runs": _runs_table(self.reports)}
 
 
@@ -214,7 +214,7 @@ class BackupResult(Result):
         return {"verdict": self.verdict.to_object(), "copy": str(self.copy), "bytes": self.size_bytes, "runs": runs}
 
     def tables(self) -> "dict[str, QTable]":
-        """`runs`: a row a run."""
+        """`runs`: a row a run of the journal."""
         return {"runs": _runs_table(self.reports)}
 
 
