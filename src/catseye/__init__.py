@@ -16,6 +16,17 @@ from catseye.version import __version__
 if TYPE_CHECKING:
     from catseye.api.air_paths import acoustic, refractometer
     from catseye.api.baseline import baseline
+    from catseye.api.figures import (
+        plot_aberration,
+        plot_air,
+        plot_beam,
+        plot_coating,
+        plot_polarization,
+        plot_return,
+        plot_servo,
+        plot_sky,
+    )
+    from catseye.api.journal import backup_journal, check_journal, export
     from catseye.api.laboratory import calibrate, certificate, save_triplet_form, triplet
     from catseye.api.living import replay, simulate
     from catseye.api.network import adjust, compare
@@ -37,6 +48,17 @@ if TYPE_CHECKING:
 FACE = {  # file of catseye.api -> its exported names
     "air_paths": ("acoustic", "refractometer"),
     "baseline": ("baseline",),
+    "figures": (
+        "plot_aberration",
+        "plot_air",
+        "plot_beam",
+        "plot_coating",
+        "plot_polarization",
+        "plot_return",
+        "plot_servo",
+        "plot_sky",
+    ),
+    "journal": ("backup_journal", "check_journal", "export"),
     "laboratory": ("calibrate", "certificate", "save_triplet_form", "triplet"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare"),
@@ -67,13 +89,16 @@ __all__ = [
     "acoustic",
     "adjust",
     "air",
+    "backup_journal",
     "baseline",
     "beam",
     "calibrate",
     "certificate",
+    "check_journal",
     "compare",
     "examples",
     "explain",
+    "export",
     "fit_pointing",
     "glass",
     "link",
@@ -82,6 +107,14 @@ __all__ = [
     "night",
     "panels",
     "plan",
+    "plot_aberration",
+    "plot_air",
+    "plot_beam",
+    "plot_coating",
+    "plot_polarization",
+    "plot_return",
+    "plot_servo",
+    "plot_sky",
     "point",
     "pose",
     "predict_pointing",

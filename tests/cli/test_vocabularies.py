@@ -24,6 +24,7 @@ from catseye.ranger import addresses
 from catseye.records.site.target import FrameName
 from catseye.reduction.calibrations import kinds
 from catseye.reduction.calibrations.field_report import FORMS
+from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.network.treatment import AdjustmentOptions
 from catseye.reduction.pose import pointing_offsets
 from catseye.reduction.pose import pose as pose_recipe
@@ -36,6 +37,7 @@ from catseye.service.coordinator import Filter
 
 SOURCES = {
     "AIR_MODELS": air.MODELS,
+    "AIR_MODEL": [ReductionSettings.air_model],
     "SOUND_MODELS": speed.MODELS,
     "THERMOMETRY_MODELS": reversed(speed.MODELS),
     "EDITIONS": limits.EDITIONS,

@@ -254,26 +254,40 @@ ONE_CALL = [
     "beam",
     "calibrate",
     "certificate",
+    "examples",
     "explain",
+    "export",
     "glass",
+    "journal backup",
+    "journal check",
     "link",
     "night",
+    "panels",
     "plan",
+    "plot aberration",
+    "plot air",
+    "plot beam",
+    "plot coating",
+    "plot polarization",
+    "plot return",
+    "plot servo",
+    "plot sky",
     "point",
     "pointing fit",
     "pointing predict",
     "pointing track",
-    "panels",
     "pose",
     "reduce",
     "refractometer",
     "replay",
     "safety",
+    "simulate",
     "sound",
-    "triplet",
     "structure",
     "surface",
+    "triplet",
 ]
+VERBS = ("plot",)  # groups whose name is the verb
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
 
@@ -289,8 +303,9 @@ def callbacks():
 
 
 def python_name(words):
-    """Function of catseye that is a command: `pointing fit` is `fit_pointing`."""
-    return "_".join(reversed(words.split())).replace("-", "_")
+    """Function of catseye that is a command: `pointing fit` is `fit_pointing`, `plot sky` is `plot_sky`."""
+    parts = words.split()
+    return "_".join(parts if parts[0] in VERBS else reversed(parts)).replace("-", "_")
 
 
 def signatures(words):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from catseye.coordinator.journal.recovery import recover
+from catseye.coordinator.journal.verdict import chain_verdict
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
-from catseye.gateways.journal.chain import chain_verdict
 from catseye.records.night.live import LiveShot
 from catseye.service.journals import checked, exported
 from catseye.simulator.clock.world_clock import ManualClock

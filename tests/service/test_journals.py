@@ -13,9 +13,9 @@ import pytest
 
 from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.journal.reader import JournalReader
+from catseye.coordinator.journal.verdict import chain_verdict
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
-from catseye.gateways.journal.chain import chain_verdict
 from catseye.records.night.live import LiveShot
 from catseye.service.journals import checked, copied, exported
 from catseye.simulator.clock.world_clock import ManualClock

@@ -11,7 +11,7 @@ from catseye.coordinator.journal.movement import Moving
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.sameness import Sameness
 from catseye.errors import InputError
-from catseye.service.replay import Cause, replay_object, replay_passages, replay_verdict, replayed
+from catseye.service.replay import Cause, replay_object, replay_passages, replayed
 from cli.living_scene import recorded
 from repository import TESTS
 from service.replay_scene import carried_back, in_epoch, reworded, rewritten
@@ -53,7 +53,7 @@ def test_same_version_is_identical(tmp_path):
     outcome = again(rewritten(tmp_path / "j.db"))
     assert outcome.sameness is Sameness.IDENTICAL
     assert (outcome.same, outcome.identical, outcome.cause, outcome.first) == (True, True, None, "")
-    assert replay_verdict(outcome) == ("good", "every answer is the same bit for bit")
+    assert outcome.verdict == ("good", "every answer is the same bit for bit")
 
 
 def test_reworded_notes_and_reasons_are_the_same_numbers(tmp_path):
@@ -64,7 +64,7 @@ def test_reworded_notes_and_reasons_are_the_same_numbers(tmp_path):
     assert outcome.identical_epochs == 0
     assert outcome.same_shots == outcome.shots
     assert outcome.shots - outcome.identical_shots == 3  # two blocked and one dropout have a text
-    verdict = replay_verdict(outcome)
+    verdict = outcome.verdict
     assert verdict.word == "good"
     assert "texts are another version's" in verdict.why
     assert "2 epochs and 3 shots have texts of another version" in told(outcome)["Epochs"]
@@ -85,7 +85,7 @@ def test_one_ulp_of_a_coordinate_is_reported_with_its_size(tmp_path):
     assert points.rms == pytest.approx(ulp / math.sqrt(points.count), rel=1e-12)
     assert points.rms_u == pytest.approx(ulp / u[row][0] / math.sqrt(points.normalised), rel=1e-12)
     assert f"at most {ulp * 1e3:.1e} mm ({names[row]}, epoch 2)" in told(outcome)["Points"]
-    verdict = replay_verdict(outcome)
+    verdict = outcome.verdict
     assert verdict.word == "failed"  # the same name of a version
     assert f"points by up to {ulp * 1e3:.1e} mm, {ulp / u[row][0]:.1e} of a coordinate's u" in verdict.why
     assert "by its solution (x)" in verdict.why
@@ -99,7 +99,7 @@ def test_changed_shot_status_in_an_epoch_differs(tmp_path):
 
     outcome = again(rewritten(tmp_path / "j.db", in_epoch(2, other)))
     assert (outcome.sameness, dict(outcome.parts)) == (Sameness.DIFFERENT, {"rejected": 1})
-    assert "no point changes" in replay_verdict(outcome).why
+    assert "no point changes" in outcome.verdict.why
 
 
 def test_changed_status_of_a_shot_differs(tmp_path):
@@ -149,7 +149,7 @@ def test_journal_version_1_by_another_version_reports_size_of_changes(tmp_path, 
     assert found["points"][names[row]]["largest_u"] == pytest.approx(3e-4 / u[row][0], rel=1e-9)
     assert found["points"][names[row]]["mean_mm"][0] == pytest.approx(-0.15, rel=1e-9)  # new less stored
     assert (found["versions"]["stored"]["catseye"], found["cause"]) == ("0.0.9", "software")
-    verdict = replay_verdict(outcome)
+    verdict = outcome.verdict
     assert verdict.word == "doubtful"
     assert "points by up to 0.300 mm" in verdict.why
     why = [text for title, text in replay_passages(outcome) if title == "Why"]
@@ -160,7 +160,7 @@ def test_journal_version_1_by_another_version_reports_size_of_changes(tmp_path, 
 def test_without_samples_the_software_is_not_blamed(tmp_path):
     outcome = again(rewritten(tmp_path / "j.db", keep_buffers=False))
     assert (outcome.sameness, outcome.cause) == (Sameness.DIFFERENT, Cause.SAMPLES)
-    assert replay_verdict(outcome).word == "doubtful"
+    assert outcome.verdict.word == "doubtful"
     assert "stored no samples" in told(outcome)["Why"]
 
 

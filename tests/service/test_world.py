@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 import typer
 
-from catseye.cli.live.groups import TwinOptions
+from catseye.api.serving import twin_options, twin_world
 from catseye.errors import InputError
 from catseye.service.world import TwinWords
 from simulator.living_scene import site
 
 
 def test_options_recreate_the_same_twin_in_another_process(monkeypatch):
-    import catseye.cli.live.zy as command
     from catseye.cli.commands import app, join_commands
 
     join_commands()
@@ -25,7 +24,7 @@ def test_options_recreate_the_same_twin_in_another_process(monkeypatch):
         raise InputError("enough")
 
     monkeypatch.setattr("catseye.service.world.TwinWords", noted)
-    monkeypatch.setattr(command, "site_of", lambda name: site())
+    monkeypatch.setattr("catseye.api.serving.read_site_of", lambda name: site())
     with pytest.raises(InputError, match="enough"):
         typer.main.get_command(app).main(["zy", "gbt", *world.options()])
     assert made == [world]
@@ -33,7 +32,7 @@ def test_options_recreate_the_same_twin_in_another_process(monkeypatch):
 
 @pytest.mark.parametrize("offset", [None, 0.0, -864_000.0, 1e8])
 def test_without_a_start_the_twin_begins_now_in_its_own_time(offset):
-    world = TwinOptions().world(offset)
+    world = twin_world(None, offset, twin_options(1, "track 145.3 45", "night", ()))
     assert world.twin(site()).seconds(world.clock().now_ns()) == pytest.approx(0.0, abs=30.0)
     assert world.offset == pytest.approx(offset or 0.0, abs=30.0)
 

@@ -3,16 +3,18 @@
 import asyncio
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from catseye.aliases import Progress
-from catseye.api.reading import DATABASES, place_of
+from catseye.api.journal import journal_place, run_of
+from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
+from catseye.api.serving import MOTION, coordinator_orders, mjd_start, read_site_of, twin_options, within
 from catseye.api.units import In, with_units
-from catseye.errors import InputError
+from catseye.errors import ArgumentError
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -22,8 +24,11 @@ if TYPE_CHECKING:
     from catseye.records.site.folder import SiteFolder
     from catseye.service.replay import ReplayOutcome
     from catseye.service.simulation import Simulation
+    from catseye.service.world import TwinWords
 
 NIGHT = 60_635.125  # MJD: 22 h at Green Bank, no Sun and no Moon that matter
+UNTIL_READY = 12.0  # s that a twin takes to start: its faults' times count from about the first round on
+MOST_MINUTES = 1e6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,11 +38,13 @@ class SimulationResult(Result):
     seconds      of the site's time, from the first round on
     epochs       one a solution, as `--json` has them: time, points, shots, how far from the truth
     simulation   everything else
+    signal       number of the signal that ended it; 0 for none
     """
 
     seconds: float
     epochs: list[dict[str, Any]]
     simulation: "Simulation"
+    signal: int = 0
 
     def passages(self) -> "Sequence[Passage]":
         """Shots, epochs, the truth, faults and troubles."""
@@ -75,68 +82,119 @@ def simulate(
     *,
     minutes: Annotated[Any, In("min", one=True)] = 1.0,
     seed: Annotated[Any, In("", whole=True)] = 1,
-    motion: str = "track 145.3 45",
+    motion: str = MOTION,
     conditions: str = "night",
     faults: Sequence[str] = (),
-    start_mjd: Annotated[Any, In("mjd", one=True)] = NIGHT,
+    start_mjd: Annotated[Any, In("mjd", one=True, text=True)] = NIGHT,
+    cold: bool = False,
     journal: "str | os.PathLike[str] | None" = None,
+    keep_buffers: bool = True,
     round_s: Annotated[Any, In("s", one=True)] = 10.0,
+    filter_: str = "random_walk",
     drop: Sequence[str] = (),
+    port_base: Annotated[Any, In("", whole=True)] = 0,
+    port: Annotated[Any, In("", whole=True)] = None,
+    fast: bool = True,
+    end_on_signals: bool = False,
+    tell: "Callable[[str], None] | None" = None,
+    screen: bool = False,
 ) -> SimulationResult:
-    """A whole site in virtual time: twin, rangers, coordinator, its epochs held against the truth.
+    """A whole site simulated: twin, rangers, coordinator, its epochs compared with the truth.
 
-    site         a site's folder, its bundled name, or what `load` gave
-    minutes      of measuring
-    seed         of every draw of the twin: the same seed is the same night
-    motion       "fixed AZ EL", "track AZ EL", "slew AZ0 EL0 AZ1 EL1", "scan AZ EL WIDTH RATE" (degrees), "table FILE"
-    conditions   the twin's weather: "night" and so on, as `catseye simulate --conditions`
-    faults       "KIND WHOM [START [END [SIZE]]]", as docs/living.md has them
-    start_mjd    UTC at the twin's start
-    journal      where all that happens is kept: a new SQLite file, or postgresql://...
-    round_s      length of a round, s
-    drop         rangers to leave out
+    site             a site's folder, its bundled name, or what `load` returned
+    minutes          of measuring; 0: until a signal, with `end_on_signals`
+    seed             of every draw of the twin: the same seed is the same night
+    motion           "fixed AZ EL", "track AZ EL", "slew AZ0 EL0 AZ1 EL1", "scan AZ EL WIDTH RATE" (degrees) or
+                     "table FILE"
+    conditions       the twin's weather: "night", "windy-day" or "dewy-night"
+    faults           "KIND WHOM [START [END [SIZE]]]", as docs/living.md has them
+    start_mjd        UTC at the twin's start, MJD or text
+    cold             True for rangers just powered on: half a minute more
+    journal          place of its journal: a new SQLite file, or postgresql://...; None for none
+    keep_buffers     False to store no samples: no replay is exact then
+    round_s          length of a round, s, 2 to 600
+    filter_          "random_walk" or "constant_velocity", from epoch to epoch
+    drop             rangers to leave out
+    port_base, port  of the twin and of the coordinator's clients; 0 or None for any free ports; none where `fast`
+    fast             True for virtual time: as fast as it goes, the same each time. False for real time, with the twin
+                     in another process, which reads the site itself
+    end_on_signals   True to end at SIGINT or SIGTERM with what was measured until then; for programs, which call it
+                     in their main thread
+    tell             called with a line per epoch and warning
+    screen           True for a screen on stderr instead
 
-    Raises InputError for a site, motion, fault or journal that cannot be used.
+    Raises InputError for a site, fault or journal that cannot be used; ArgumentError for invalid arguments.
     """
-    from catseye.gateways.examples import example
-    from catseye.records.site.folder import SiteFolder, read_site
-    from catseye.service.coordinator import Orders
+    from catseye.records.site.folder import SiteFolder
     from catseye.service.objects import epoch_object, simulation_verdict
     from catseye.service.running import FastLoop
-    from catseye.service.screen import SilentView
+    from catseye.service.screen import LinesView, ScreenView, SilentView
     from catseye.service.simulation import Simulation
+
+    within("minutes", minutes, 0.0, MOST_MINUTES)
+    if minutes == 0.0 and not end_on_signals:
+        raise ArgumentError("minutes = 0 never ends (expected above 0, or end_on_signals)", "minutes", "end_on_signals")
+    if isinstance(site, SiteFolder) and not fast:
+        raise ArgumentError("site: the twin's process reads it (expected a folder, or fast)", "site", "fast")
+    within("port_base", port_base, 0, 65_000)
+    world = _world(mjd_start(start_mjd, NIGHT), twin_options(seed, motion, conditions, faults), fast)
+    orders = coordinator_orders(
+        drop=drop,
+        round_s=round_s,
+        filter_=filter_,
+        journal=journal,
+        keep_buffers=keep_buffers,
+        port=0 if port is None and (fast or port_base == 0) else port,
+    )
+    records = site if isinstance(site, SiteFolder) else read_site_of(site)
+    view = ScreenView() if screen else SilentView() if tell is None else LinesView(tell)
+    simulation = Simulation(
+        site=records,
+        name="" if isinstance(site, SiteFolder) else str(site),  # of real time, for the twin's process
+        world=world,
+        orders=orders,
+        minutes=minutes,
+        view=view,
+        port_base=port_base,
+        warm=not cold,
+    )
+    work = simulation.run_fast if fast else simulation.run
+    number = _run(work, FastLoop if fast else None, end_on_signals)
+    return SimulationResult(
+        verdict=simulation_verdict(simulation.book),
+        seconds=simulation.seconds,
+        epochs=[epoch_object(row, simulation.book.comparisons.get(row["number"])) for row in simulation.book.epochs],
+        simulation=simulation,
+        signal=number,
+    )
+
+
+def _world(begins: float, options: dict[str, Any], fast: bool) -> "TwinWords":
+    """Options of the twin; in real time its faults count from about the first round on."""
     from catseye.service.world import TwinWords
 
-    if not 0.0 < minutes <= 1e4:
-        raise InputError(f"minutes = {minutes:g} (expected above 0 to 10000)")
-    records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
-    world = TwinWords(start_mjd, seed=seed, motion=motion, conditions=conditions, faults=tuple(faults))
-    orders = Orders(
-        drop=tuple(name.upper() for name in drop),
-        round_s=round_s,
-        journal=None if journal is None else str(journal),
-        port=0,
-    )
-    name = str(example("gbt") if site == "gbt" else records.directory)
-    simulation = Simulation(records, name, world, orders, minutes, SilentView(), port_base=0, warm=True)
-    _in_thread(simulation, FastLoop)
-    return SimulationResult(
-        simulation_verdict(simulation.book),
-        simulation.seconds,
-        [epoch_object(row, simulation.book.comparisons.get(row["number"])) for row in simulation.book.epochs],
-        simulation,
-    )
+    return TwinWords(begins, **options) if fast else TwinWords.starting_now(begins, **options).late(UNTIL_READY)
 
 
-def _in_thread(simulation: "Simulation", loop_factory: Any) -> None:
-    """Run it to its end in a thread of its own: a notebook's own loop is already running here."""
+def _run(work: "Callable[[], Coroutine[Any, Any, None]]", loop_factory: Any, end_on_signals: bool) -> int:
+    """Number of the signal that ended the work; 0 for its own end.
 
-    def work() -> None:
+    Without signals it runs in a thread: a notebook's own loop is already running here.
+    """
+    if end_on_signals:
+        from catseye.service.running import LiveRun
+
+        run: LiveRun[None] = LiveRun(work, loop_factory=loop_factory)
+        run.result()
+        return run.signal
+
+    def in_thread() -> None:
         with asyncio.Runner(loop_factory=loop_factory) as runner:
-            runner.run(simulation.run_fast())
+            runner.run(work())
 
     with ThreadPoolExecutor(1, "catseye-simulate") as pool:
-        pool.submit(work).result()
+        pool.submit(in_thread).result()
+    return 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,16 +258,12 @@ def replay(
 
     Raises InputError: no such journal, run or folder; a run that holds no epoch.
     """
-    from catseye.coordinator.journal.reader import JournalReader
-    from catseye.service.replay import replay_verdict, replayed
+    from catseye.service.replay import replayed
 
-    place = journal.place if isinstance(journal, JournalReader) else str(journal)
-    if not place.startswith(DATABASES):
-        place = str(place_of(place))
     other = None if calibrations is None else place_of(calibrations)
-    outcome = replayed(place, run, other, progress=progress or (lambda what, done, total: None))
+    outcome = replayed(journal_place(journal), run_of(run), other, progress=progress or (lambda *_: None))
     return ReplayResult(
-        verdict=replay_verdict(outcome),
+        verdict=outcome.verdict,
         same=outcome.same,
         identical=outcome.identical,
         shots=outcome.shots,

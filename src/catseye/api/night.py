@@ -1,7 +1,7 @@
 """`reduce`, `explain` and `night`: samples to coordinates, a shot down to every input, and a simulated night."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +12,7 @@ from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
+from catseye.errors import ArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from catseye.reduction.epoch.epoch import Reduction
     from catseye.reduction.epoch.surface import DishPose
     from catseye.simulator.night.night import Night
+
+FEWEST_DRAWS = 1000  # that show a 95 % interval at all
+MOST_DRAWS = 10_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,6 +64,25 @@ class NightResult(Result):
     def covariance(self) -> np.ndarray:
         """(3n, 3n) m², x, y, z of each point in turn; of two thousand points it takes seconds and 0.4 GB."""
         return self.reduction.coordinates.covariance
+
+    def held(self) -> "NightResult":
+        """The same without the adjustment's own matrices, which take most of the memory of a large night.
+
+        The covariance of all points stays.
+        """
+        from catseye.memory import give_back
+        from catseye.processors import free_threads
+
+        with free_threads():
+            reduction = self.reduction.held()
+        give_back()
+        return replace(self, reduction=reduction)
+
+    def feed_arm(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        """Name, coordinates (3,) m and standard uncertainties (3,) mm of each ranger of the feed arm."""
+        from catseye.gateways.epoch.summary import feed_arm_rows
+
+        return feed_arm_rows(self.reduction)
 
     def passages(self) -> "Sequence[Passage]":
         """The night, the shots, the feed arm, the dish, the air, and how far to trust it all."""
@@ -135,25 +158,24 @@ def reduce(
     >>> night.x.shape, night.verdict.word
     ((130, 3), 'good')
     """
-    from catseye.gateways.epoch.summary import verdict
     from catseye.reduction.epoch.epoch import reduce_epoch
     from catseye.reduction.epoch.settings import ReductionSettings
 
     reduction = reduce_epoch(campaign_of(campaign), ReductionSettings(air_model=air_model), progress)
     coordinates = reduction.coordinates
     return NightResult(
-        verdict(reduction),
-        tuple(coordinates.points),
-        coordinates.x,
-        coordinates.u,
-        np.array([coordinates.shots[k] for k in range(len(coordinates.points))]),
-        coordinates.variance_factor,
-        coordinates.degrees_of_freedom,
-        {shot: str(reason) for shot, reason in reduction.rejected.items()},
-        coordinates.refractivity_ppm,
-        None if reduction.surface is None else reduction.surface.pose(),
-        reduction.notes,
-        reduction,
+        verdict=reduction.verdict,
+        names=tuple(coordinates.points),
+        x=coordinates.x,
+        u=coordinates.u,
+        shots=np.array([coordinates.shots[k] for k in range(len(coordinates.points))]),
+        variance_factor=coordinates.variance_factor,
+        degrees_of_freedom=coordinates.degrees_of_freedom,
+        rejected={shot: str(reason) for shot, reason in reduction.rejected.items()},
+        refractivity_ppm=coordinates.refractivity_ppm,
+        pose=None if reduction.surface is None else reduction.surface.pose(),
+        notes=reduction.notes,
+        reduction=reduction,
     )
 
 
@@ -224,6 +246,25 @@ class ExplanationResult(Result):
             {"explanation.html": lambda now: explanation_page(self.explanation, self.campaign, now)},
         )
 
+    def save_page(self, path: "str | os.PathLike[str]") -> Path:
+        """Write the page of the shot, whole or not at all: a new HTML file, or an earlier page of a shot."""
+        from datetime import UTC, datetime
+
+        from catseye.gateways.epoch.explain_page import MARK, explanation_page
+        from catseye.gateways.writers.output import atomic_file, refuse_suffix
+
+        where = Path(path)
+        refuse_suffix(where, "page")
+        with atomic_file(where, "page", MARK) as pieces:
+            pieces.append(explanation_page(self.explanation, self.campaign, datetime.now(UTC)))
+        return where
+
+    def lines(self) -> list[str]:
+        """Table of the budget for a terminal, by share; empty without a range."""
+        from catseye.gateways.epoch.explain import budget_lines
+
+        return budget_lines(self.explanation)
+
     def inputs(self) -> dict[str, str]:
         """SHA-256 of the campaign's files."""
         return self.campaign.hashes
@@ -250,27 +291,42 @@ def explain(
     monte_carlo   draws through the whole chain; 0 for none
     seed          of the draws
 
-    Raises InputError for an unknown shot.
+    Raises InputError for an unknown shot; ArgumentError for a number of draws that shows no interval.
     """
-    from catseye.gateways.epoch.explain import explanation_verdict
     from catseye.reduction.budget.explanation import explain_shot
     from catseye.reduction.epoch.settings import ReductionSettings
 
     night = campaign_of(campaign)
     settings = ReductionSettings(air_model=air_model)
+    if monte_carlo != 0 and not FEWEST_DRAWS <= monte_carlo <= MOST_DRAWS:
+        raise ArgumentError(
+            f"monte_carlo = {monte_carlo} (expected 0, for none, or {FEWEST_DRAWS} to {MOST_DRAWS})", "monte_carlo"
+        )
+    if seed < 0:
+        raise ArgumentError(f"seed = {seed} (expected 0 or more)", "seed")
     found = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
     return ExplanationResult(
-        explanation_verdict(found),
-        found.shot,
-        found.ranger,
-        found.target,
-        str(found.status),
-        found.budget.value if found.budget is not None else None,
-        found.budget.u if found.budget is not None else None,
-        found,
-        night,
-        seed if monte_carlo else None,
+        verdict=found.verdict,
+        shot=found.shot,
+        ranger=found.ranger,
+        target=found.target,
+        status=str(found.status),
+        range_=found.budget.value if found.budget is not None else None,
+        u_range=found.budget.u if found.budget is not None else None,
+        explanation=found,
+        campaign=night,
+        seed=seed if monte_carlo else None,
     )
+
+
+def require_page(page: "Path | None") -> None:
+    """Refuse a page that `ExplanationResult.save_page` would refuse, before the long work; None: none."""
+    from catseye.gateways.epoch.explain_page import MARK
+    from catseye.gateways.writers.output import refuse_file, refuse_suffix
+
+    if page is not None:
+        refuse_suffix(page, "page")
+        refuse_file(page, "page", MARK)
 
 
 def campaign_of(source: "str | os.PathLike[str] | Campaign") -> "Campaign":

@@ -26,18 +26,22 @@ EXPECTED = (
 )
 
 
-def examples(name: str | None = None) -> Any:
-    """Path of an example, or the names of all.
+def examples(name: str | None = None, *, directory: "str | os.PathLike[str] | None" = None) -> Any:
+    """Path of an example, the names of all, or copies of them.
 
-    name   "night-01", "gbt", or one of the names listed; None: list them
+    name        "night-01", "gbt", or one of the names listed; None for all
+    directory   where to copy them, new or empty; None: they stay
 
-    Returns a Path, or a tuple of names. Raises InputError for a name that is none.
+    Returns a Path, or a tuple of names; with `directory` a tuple of the files written. Raises InputError for an
+    unknown name, and for a directory that is not empty or cannot be written.
 
     >>> examples("networks/feed-arm.toml").name
     'feed-arm.toml'
     """
-    from catseye.gateways.examples import example, example_names
+    from catseye.gateways.examples import copy_example, example, example_names
 
+    if directory is not None:
+        return copy_example(name or "", Path(directory))
     return example_names() if name is None else example(name)
 
 

@@ -59,9 +59,7 @@ class Result:
 
     def to_json(self) -> str:
         """JSON object of the command, on one line."""
-        from catseye.gateways.writers.objects import json_line
-
-        return json_line(self.to_object())
+        return json_text(self.to_object())
 
     @property
     def answered(self) -> bool:
@@ -250,6 +248,13 @@ def quantities(columns: "Mapping[str, tuple[Any, str]]", **meta: Any) -> "QTable
         },
         meta=meta,
     )
+
+
+def json_text(value: Any) -> str:
+    """JSON text on one line; NaN and infinity become null."""
+    from catseye.gateways.writers.objects import json_line
+
+    return json_line(value)
 
 
 def digest_of(path: Path) -> str:

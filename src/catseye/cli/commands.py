@@ -1,7 +1,6 @@
 """The commands. What they need is imported when they run, so that `--help` answers at once."""
 
 import math
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,8 +11,7 @@ from typer.core import TyperGroup
 from catseye.cli.inputs import prepare
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine, say, wrapped
-from catseye.cli.vocabularies import AIR_MODELS, one_of
-from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.cli.vocabularies import AIR_MODEL, AIR_MODELS, one_of
 from catseye.version import __version__
 
 if TYPE_CHECKING:
@@ -143,7 +141,7 @@ def reduce(
             help="Directory to write: new, empty, or an earlier output of catseye. Needed unless --json.",
         ),
     ] = None,
-    air_model: AirModel = ReductionSettings.air_model,
+    air_model: AirModel = AIR_MODEL,
     threads: Threads = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -164,9 +162,9 @@ def demo(
     quiet: Quiet = False,
 ) -> None:
     """The bundled night of measurements, reduced and explained."""
-    from catseye.gateways.examples import example_campaign
+    from catseye.api.reading import examples as bundled
 
-    night = _reduced(example_campaign(), directory, ReductionSettings.air_model, quiet)
+    night = _reduced(bundled("night-01"), directory, AIR_MODEL, quiet)
     _tell(night, None, json=json, quiet=quiet)
     if not json and not quiet:
         say(f"\nReport: {directory / 'report.html'}")
@@ -180,41 +178,35 @@ def examples(
     json: Json = False,
 ) -> None:
     """List the bundled examples, or write them into a folder."""
-    from catseye.gateways.examples import copy_example, example_names
-    from catseye.gateways.writers.objects import json_line
+    from catseye.api.reading import examples as bundled
+    from catseye.api.result import json_text
 
-    names = example_names()
-    written = None if directory is None else copy_example("", directory)
+    names = bundled()
+    written = () if directory is None else bundled(directory=directory)
     if json:
-        say(json_line({"examples": names, "written": None if directory is None else str(directory)}))
+        say(json_text({"examples": names, "written": None if directory is None else str(directory)}))
     elif directory is None:
         for folder in dict.fromkeys(name.rpartition("/")[0] for name in names):
             inside = [name.rpartition("/")[2] for name in names if name.rpartition("/")[0] == folder]
             say(wrapped(f"{folder}/" if folder else "", ", ".join(inside)))
         say("\nEach name stands wherever a path does: catseye reduce night-01 --out night")
     else:
-        say(f"Written: {written} files in {directory}/")
+        say(f"Written: {len(written)} files in {directory}/")
         say(f"Next:    catseye reduce {directory / 'night-01'} --out night")
 
 
 def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "NightResult":
     """Read, reduce and, when there is an `out`, write it whole or not at all."""
-    from catseye.gateways.writers.output import refuse_output
+    from catseye.api.result import require_writable, save
 
-    if out is not None:
-        refuse_output(out, campaign)
+    require_writable(out, campaign)
     progress = ProgressLine(quiet)
     try:
         from catseye.api.night import reduce as reduced
-        from catseye.api.result import save
-        from catseye.memory import give_back
-        from catseye.processors import free_threads
 
         night = reduced(campaign, air_model=air_model, progress=progress)
         if out is not None:
-            with free_threads():
-                night = replace(night, reduction=night.reduction.held())  # all else of the adjustment may go
-            give_back()
+            night = night.held()  # all else of the adjustment may go
             save(night, out, progress=progress)
         return night
     finally:
@@ -223,10 +215,8 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
 
 def _tell(night: "NightResult", files: str | None, *, json: bool, quiet: bool, strict: bool = False) -> None:
     """The night's sentences, the feed arm's rows after them, and where the rest is."""
-    from catseye.gateways.epoch.summary import feed_arm_rows
-
     rows = [
         f"{'':<14}{name}  x {x[0]:9.4f}  y {x[1]:9.4f}  z {x[2]:9.4f} m   u {u[0]:.3f}, {u[1]:.3f}, {u[2]:.3f} mm"
-        for name, x, u in feed_arm_rows(night.reduction)
+        for name, x, u in night.feed_arm()
     ]
     tell(night, json=json, quiet=quiet, strict=strict, rows=rows, under="The feed arm", written=[("Written to", files)])

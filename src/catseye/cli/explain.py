@@ -1,22 +1,16 @@
 """The command of one range: explain."""
 
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from catseye.cli.commands import AirModel, Json, Quiet, app
-from catseye.cli.results import Strict, judge
-from catseye.cli.terminal import ProgressLine, say, wrapped
-from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.cli.results import Strict, tell
+from catseye.cli.terminal import ProgressLine
+from catseye.cli.vocabularies import AIR_MODEL
 
-if TYPE_CHECKING:
-    from catseye.records.night.campaign import Campaign
-    from catseye.reduction.budget.explanation import Explanation
-
-FEWEST = 1000  # draws that show a 95 % interval at all
-MOST = 10_000_000
+FEWEST, MOST = 1000, 10_000_000  # draws, as in catseye.api.night
 
 
 def _draws(value: int) -> int:
@@ -37,65 +31,24 @@ def explain(  # noqa: PLR0913 - its options are its command line
     monte_carlo: Annotated[
         int, typer.Option("--monte-carlo", metavar="N", callback=_draws, help="Draws of the Monte Carlo; 0 for none.")
     ] = 200_000,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the draws.")] = 1,
-    air_model: AirModel = ReductionSettings.air_model,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the draws.")] = 1,
+    air_model: AirModel = AIR_MODEL,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
     """The range of one shot and every cause of its uncertainty, before any adjustment."""
+    from catseye.api.night import explain as explained
+    from catseye.api.night import require_page
+
+    require_page(page)
     progress = ProgressLine(quiet)
     try:
-        from catseye.records.night.campaign import read_campaign
-        from catseye.reduction.budget.explanation import explain_shot
-
-        settings = ReductionSettings(air_model=air_model)
-        with _page(page) as pieces:  # refused before the work, not after it
-            night = read_campaign(campaign)
-            explanation = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
-            if page is not None:
-                pieces.append(_page_of(explanation, night))
+        result = explained(campaign, shot, air_model=air_model, monte_carlo=monte_carlo, seed=seed, progress=progress)
+        if page is not None:
+            result.save_page(page)
     finally:
         progress.clear()
-    if json:
-        from catseye.gateways.epoch.explain import explanation_object
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(explanation_object(explanation, seed if monte_carlo else None)))
-    elif not quiet:
-        _tell(explanation, page)
-    if strict:
-        from catseye.gateways.epoch.explain import explanation_verdict
-
-        judge(explanation_verdict(explanation), strict=strict)
-
-
-def _page(page: Path | None) -> AbstractContextManager[list[str]]:
-    if page is None:
-        return nullcontext([])
-    from catseye.gateways.epoch.explain_page import MARK
-    from catseye.gateways.writers.output import atomic_file, refuse_suffix
-
-    refuse_suffix(page, "--page")
-    return atomic_file(page, "--page", MARK)
-
-
-def _page_of(explanation: "Explanation", night: "Campaign") -> str:
-    from datetime import UTC, datetime
-
-    from catseye.gateways.epoch.explain_page import explanation_page
-
-    return explanation_page(explanation, night, datetime.now(UTC))
-
-
-def _tell(explanation: "Explanation", page: Path | None) -> None:
-    from catseye.gateways.epoch.explain import budget_lines, explanation_passages, explanation_verdict
-
-    say(wrapped("Verdict", explanation_verdict(explanation).text))
-    for passage in explanation_passages(explanation):
-        say(wrapped(passage.title, passage.text))
-    lines = budget_lines(explanation)
-    if lines:
-        say("\n" + "\n".join(lines))
-    if page is not None:
-        say("\n" + wrapped("Written to", str(page)))
+    lines = result.lines()
+    rows = [*(["", *lines] if lines else []), *([] if page is None else [""])]
+    tell(result, json=json, quiet=quiet, strict=strict, rows=rows, written=[("Written to", page)])

@@ -16,13 +16,14 @@ from catseye.cli.terminal import say
 )
 def night(  # noqa: PLR0913 - its options are its command line
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where the campaign goes: new or empty.")],
-    seed: Annotated[int, typer.Option(help="Of every draw: the same night each time.")] = 2209,
+    seed: Annotated[int, typer.Option(help="Seed of every draw: the same night each time.")] = 2209,
     dish_prisms: Annotated[int, typer.Option(help="Prisms on the dish; the telescope has 2209.")] = 2209,
-    azimuth_deg: Annotated[float, typer.Option(help="Of the telescope.")] = 145.3,
-    elevation_deg: Annotated[float, typer.Option(help="Of the telescope, 5 to 90.")] = 30.0,
-    interval_s: Annotated[float, typer.Option(help="Between two shots of a ranger, s.")] = 8.0,
+    azimuth_deg: Annotated[float, typer.Option(help="Azimuth of the telescope.")] = 145.3,
+    elevation_deg: Annotated[float, typer.Option(help="Elevation of the telescope, 5 to 90.")] = 30.0,
+    interval_s: Annotated[float, typer.Option(help="Time between two shots of a ranger, s.")] = 8.0,
     again: Annotated[
-        float, typer.Option(help="How often each feed-arm ranger shoots each prism once more; a fraction is a share.")
+        float,
+        typer.Option(help="Further shots of each feed-arm ranger at each prism; a fraction is a share."),
     ] = 0.43,
     nature: Annotated[
         float,
@@ -35,7 +36,7 @@ def night(  # noqa: PLR0913 - its options are its command line
 ) -> None:
     """A simulated night of the whole telescope as a campaign: 18 rangers, 2209 prisms, 20 000 shots."""
     from catseye.api.night import night as make
-    from catseye.gateways.writers.objects import json_line
+    from catseye.api.result import json_text
 
     where = make(
         directory,
@@ -48,7 +49,7 @@ def night(  # noqa: PLR0913 - its options are its command line
         nature=nature,
     )
     if json:
-        say(json_line({"written": str(where), "seed": seed, "nature": nature, "truth": str(where / "truth.json")}))
+        say(json_text({"written": str(where), "seed": seed, "nature": nature, "truth": str(where / "truth.json")}))
     else:
         say(f"Written: {where}/, a campaign; its truth is in truth.json, which no reduction reads")
         say(f"Next:    catseye reduce {where} --out {where}-report")

@@ -12,6 +12,7 @@ from catseye import names
 
 # atmosphere
 AIR_MODELS = "|".join(names.AIR_MODELS)
+AIR_MODEL = names.NOTES_AIR_MODEL  # of a reduction
 SOUND_MODELS = "parker2004|cramer1993|real_gas"
 THERMOMETRY_MODELS = "real_gas|cramer1993|parker2004"  # the one of choice first
 

@@ -82,8 +82,8 @@ def located(path: Path | str, *, output: bool = False) -> Path:
         return local
 
 
-def copy_example(name: str, directory: Path) -> int:
-    """Copy a folder of examples atomically; number of files.
+def copy_example(name: str, directory: Path) -> tuple[Path, ...]:
+    """Copy a folder of examples atomically; the files written.
 
     name        as for `example`, or "" for all
     directory   new or empty
@@ -104,4 +104,4 @@ def copy_example(name: str, directory: Path) -> int:
 
         ignored = shutil.ignore_patterns(*SKIPPED)
         shutil.copytree(root, fresh, ignore=ignored, copy_function=copied, dirs_exist_ok=True)
-    return sum(path.is_file() for path in directory.rglob("*"))
+    return tuple(sorted(path for path in directory.rglob("*") if path.is_file()))

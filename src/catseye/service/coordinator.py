@@ -171,7 +171,7 @@ class LiveCoordinator:
     ):
         strange = sorted(set(orders.drop) - set(peers.rangers))
         if strange:
-            raise InputError(f"--drop {strange[0]}: unknown ranger (expected one of {', '.join(peers.rangers)})")
+            raise InputError(f"drop {strange[0]}: unknown ranger (expected one of {', '.join(peers.rangers)})")
         self.site, self.orders = site, orders
         self.settings = LiveSettings(filter=orders.filter)
         self.live = Live(site, self.settings)

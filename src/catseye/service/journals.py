@@ -13,14 +13,15 @@ from typing import Any, Literal
 from urllib.parse import quote
 
 from catseye.aliases import Progress
+from catseye.coordinator.journal.campaign import journal_campaign
 from catseye.coordinator.journal.chain import Head
 from catseye.coordinator.journal.check import ChainReport, has_head, parted, verify_run
 from catseye.coordinator.journal.place import place_of, refuse_foreign
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.recovery import recover
+from catseye.coordinator.journal.verdict import export_verdict
 from catseye.errors import InputError
-from catseye.gateways.journal.campaign import export_campaign
-from catseye.gateways.journal.chain import export_verdict
+from catseye.gateways.journal.campaign import write_campaign
 from catseye.gateways.journal.export import export_tables
 from catseye.interruption import Unfinished, undo_on_interruption
 from catseye.verdict import Verdict
@@ -210,7 +211,7 @@ def exported(
         if chain.count and not damaged:
             raise InputError(
                 f"journal {reader.place}: run {number} fails verification: {chain.problems[0]} (use its "
-                "backup, or --damaged to skip altered entries)"
+                "backup, or export it as damaged, without altered entries)"
             )
         if notes and chain.unvouched:  # explained by lost pages with links or samples, not by insertion
             count = len(chain.unvouched)
@@ -218,9 +219,10 @@ def exported(
             chain.bad -= chain.unvouched
         if form == "campaign":
             progress("writing the campaign", 0, 1)
-            written = export_campaign(reader, out, run=number, span=span, chain=chain)
-            counts = {"shots": written.shots, "weather": written.readings}
-            return ExportOutcome(number, chain, counts, (*notes, *written.notes), written.verdict.hearing(notes))
+            campaign = journal_campaign(reader, number, span=span, chain=chain)
+            write_campaign(campaign, out)
+            counts = {"shots": len(campaign.shots), "weather": len(campaign.readings)}
+            return ExportOutcome(number, chain, counts, (*notes, *campaign.notes), campaign.verdict.hearing(notes))
         counts = export_tables(reader, out, runs=[number], forms=[form], span=span, progress=progress, chains=[chain])
         return ExportOutcome(number, chain, counts, notes, export_verdict(chain, sum(counts.values()), notes))
 

@@ -88,7 +88,7 @@ def simulation_object(
 
 
 def epoch_object(row: dict[str, Any], compared: EpochComparison | None) -> dict[str, Any]:
-    """An epoch for `--json`, with its errors if compared with truth."""
+    """An epoch for JSON, with its errors if compared with truth."""
     epoch = {
         "number": row["number"],
         "mjd": row["ticks"] / TICKS_PER_DAY,
@@ -195,9 +195,7 @@ def summary(
     passages.append(
         (
             "Journal",
-            f"{journal}, head {head}: catseye replay {journal}"
-            if journal
-            else "none was written (use --journal FILE).",
+            f"{journal}, head {head}: catseye replay {journal}" if journal else "none was written.",
         )
     )
     return passages

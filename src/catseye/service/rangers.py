@@ -188,27 +188,27 @@ def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
     """
     module, _, name = factory.partition(":")
     if not module or not name:
-        raise InputError(f"--head {factory!r}: expected package.module:factory")
+        raise InputError(f"head {factory!r}: expected package.module:factory")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
     try:
         head_of = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, SyntaxError) as problem:
         raise InputError(
-            f"--head {factory}: cannot be imported: {problem} (expected package.module:factory)"
+            f"head {factory}: cannot be imported: {problem} (expected package.module:factory)"
         ) from problem
     if not callable(head_of):
-        raise InputError(f"--head {factory}: {name} is not callable (expected a function of a ranger's name)")
+        raise InputError(f"head {factory}: {name} is not callable (expected a function of a ranger's name)")
     heads: dict[str, RangerHead] = {}
     for ranger in rangers:
         try:
             head = head_of(ranger)
         except (CatseyeError, OSError) as problem:
-            raise InputError(f"--head {factory}: no head for {ranger}: {problem}") from problem
+            raise InputError(f"head {factory}: no head for {ranger}: {problem}") from problem
         missing = [
             attribute for attribute in dir(RangerHead) if not attribute.startswith("_") and not hasattr(head, attribute)
         ]
         if missing:
-            raise InputError(f"--head {factory}: the object for {ranger} has no {missing[0]} (expected a Head)")
+            raise InputError(f"head {factory}: the object for {ranger} has no {missing[0]} (expected a Head)")
         heads[ranger] = head
     return heads

@@ -20,10 +20,10 @@ from catseye.coordinator.journal.sameness import Sameness
 from catseye.errors import InputError
 from catseye.gateways.journal.chain import chain_object, chain_words
 from catseye.gateways.journal.movement import movement_object, movement_words, shown
-from catseye.gateways.writers.verdict import Verdict
 from catseye.records.site.folder import SiteFolder, read_site
 from catseye.reduction.live.live import Live
 from catseye.service.settings import live_settings
+from catseye.verdict import Verdict
 from catseye.version import __version__
 
 SHOWN_POINTS = 20  # points shown to people: those that move most
@@ -130,6 +130,28 @@ class ReplayOutcome:
         return Cause.SOFTWARE if self.run.buffers else Cause.SAMPLES
 
     @property
+    def verdict(self) -> Verdict:
+        """Verdict: the same numbers to the last bit, or the cause and size."""
+        chain = self.chain
+        if chain.count:
+            return Verdict("failed", f"the journal fails verification: {chain.problems[0]}")
+        if self.same:
+            unverified = "" if chain.chained else "; written by an older catseye without a chain to verify"
+            if self.identical:
+                return Verdict("good", f"every answer is the same bit for bit{unverified}")
+            same = "every number, reason code and status is the same bit for bit"
+            return Verdict("good", f"{same}, texts are another version's{unverified}")
+        if self.cause is Cause.RECORDS:
+            furthest = max((m.largest_mm for m in self.moved.values()), default=0.0)
+            return Verdict("good", f"reduced with other records, which change points by up to {furthest:.3f} mm")
+        if self.cause is Cause.SAMPLES:
+            return Verdict("doubtful", "the run stored no samples, so its answers cannot be reproduced bit for bit")
+        by = f"this version changes the run's answers: {_how_far(self)}, first {self.first}"
+        if self.other_version:
+            return Verdict("doubtful", by)
+        return Verdict("failed", f"{by}; a version of the same name should not")
+
+    @property
     def other_version(self) -> bool:
         """True if another catseye, Python or numpy wrote the run."""
         return self.run.versions != versions_here()
@@ -219,30 +241,6 @@ def _moved(rows: list[tuple[np.ndarray, np.ndarray]]) -> Moved:
     return Moved((x, y, z), largest, float(over.max()) if len(over) else math.nan, len(rows))
 
 
-def replay_verdict(outcome: ReplayOutcome) -> Verdict:
-    """Verdict: the same numbers to the last bit, or the cause and size."""
-    chain = outcome.chain
-    if chain.count:
-        return Verdict("failed", f"the journal fails verification: {chain.problems[0]}")
-    if outcome.same:
-        unverified = "" if chain.chained else "; written by an older catseye without a chain to verify"
-        if outcome.identical:
-            return Verdict("good", f"every answer is the same bit for bit{unverified}")
-        return Verdict(
-            "good",
-            f"every number, reason code and status is the same bit for bit, texts are another version's{unverified}",
-        )
-    if outcome.cause is Cause.RECORDS:
-        furthest = max((m.largest_mm for m in outcome.moved.values()), default=0.0)
-        return Verdict("good", f"reduced with other records, which change points by up to {furthest:.3f} mm")
-    if outcome.cause is Cause.SAMPLES:
-        return Verdict("doubtful", "the run stored no samples, so its answers cannot be reproduced bit for bit")
-    by = f"this version changes the run's answers: {_how_far(outcome)}, first {outcome.first}"
-    if outcome.other_version:
-        return Verdict("doubtful", by)
-    return Verdict("failed", f"{by}; a version of the same name should not")
-
-
 def _how_far(outcome: ReplayOutcome) -> str:
     """Largest change of a point in words."""
     points = outcome.movements.get(Moving.POINTS)
@@ -255,7 +253,7 @@ def _how_far(outcome: ReplayOutcome) -> str:
 def replay_object(outcome: ReplayOutcome) -> dict[str, Any]:
     """JSON object of `catseye replay --json`."""
     return {
-        "verdict": replay_verdict(outcome).to_object(),
+        "verdict": outcome.verdict.to_object(),
         "run": outcome.run.run,
         "uuid": outcome.run.uuid,
         "site": outcome.run.site,
@@ -317,7 +315,7 @@ def replay_passages(outcome: ReplayOutcome) -> list[tuple[str, str]]:
     largest = [pair for pair in furthest[:SHOWN_POINTS] if pair[1].largest_mm >= LEAST_SHOWN_MM]
     passages += [(name, _point_words(m)) for name, m in largest]
     if len(furthest) > len(largest):
-        passages.append(("And", f"{len(furthest) - len(largest)} more points with smaller changes (see --json)."))
+        passages.append(("And", f"{len(furthest) - len(largest)} more points with smaller changes (in the JSON)."))
     return passages
 
 
@@ -334,7 +332,7 @@ def _reworded(outcome: ReplayOutcome) -> str:
 def _why(outcome: ReplayOutcome) -> list[str]:
     """Causes of differing numbers, in sentences."""
     if outcome.cause is Cause.SAMPLES:
-        return ["the run stored no samples (use catseye ziy --keep-buffers)."]
+        return ["the run stored no samples: its coordinator was asked to keep no buffers."]
     if outcome.cause is not Cause.SOFTWARE:
         return []
     stored, current = (

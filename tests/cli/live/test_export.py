@@ -62,7 +62,11 @@ def test_a_campaign_is_one_that_can_be_read(catseye, tmp_path):
     [
         (["--to", "xls", "--out", "OUT"], 2, "'xls' is not one of csv, fits, campaign"),
         (["--to", "csv", "--out", "OUT", "--from", "noon"], 2, "noon"),
-        (["--to", "csv", "--out", "OUT", "--from", "60636", "--until", "60635"], 1, "is not before --until"),
+        (
+            ["--to", "csv", "--out", "OUT", "--from", "60636", "--until", "60635"],
+            1,
+            "at 60636 and ends at 60635",
+        ),
         (["--to", "csv", "--out", "OUT/a/b"], 1, "is not a directory"),
         (["--to", "csv", "--out", "OUT", "--run", "9"], 1, "run 9 names 0 runs"),
         (["--to", "campaign", "--out", "OUT", "--until", "60000"], 1, "no complete weather reading"),

@@ -9,7 +9,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from catseye.cli.live import simulate
+from catseye.api import living
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
 from cli.living_scene import (
@@ -38,6 +38,7 @@ OPTIONS = {"capture_output": True, "text": True, "timeout": PATIENCE, "check": T
         (["--round-s", "0.5"], "0.5 is not 2 to 600 s"),
         (["--filter", "kalman"], "'kalman' is not one of random_walk, constant_velocity"),
         (["--fault", "sleepy ZY101"], "expected KIND WHOM"),
+        (["--motion", "track 1e9 45"], "azimuth 1e+09 is outside -540 to 540"),
         (["--seed", "-3"], "-3 is not 0 to"),
         (["--unknown"], "No such option"),
     ],
@@ -50,8 +51,8 @@ def test_what_cannot_be_meant_is_wrong_usage(catseye, words, said):
 
 def test_unless_told_otherwise_it_begins_at_night_at_green_bank():
     """22 h local mean time; the Sun, by astropy's own position, is far below the horizon for the four hours to come."""
-    assert pytest.approx(22.0, abs=0.5) == simulate.NIGHT % 1.0 * 24.0 + 24.0 - 79.839835 / 15.0
-    up = astropy_sun(simulate.NIGHT + np.linspace(0.0, 4.0 / 24.0, 9))[:, 2]
+    assert pytest.approx(22.0, abs=0.5) == living.NIGHT % 1.0 * 24.0 + 24.0 - 79.839835 / 15.0
+    up = astropy_sun(living.NIGHT + np.linspace(0.0, 4.0 / 24.0, 9))[:, 2]
     assert np.degrees(np.arcsin(up)).max() < -30.0
 
 
@@ -59,7 +60,7 @@ def test_unless_told_otherwise_it_begins_at_night_at_green_bank():
     ("words", "said"),
     [
         (["--fault", "dead-ranger ZY999"], "unknown ranger ZY999"),
-        (["--drop", "ZY999"], "--drop ZY999: unknown ranger"),
+        (["--drop", "ZY999"], "drop ZY999: unknown ranger"),
         (["--journal", "/nowhere/x.db"], "directory /nowhere is missing"),
         (["--journal", __file__], "is not a journal"),
     ],

@@ -32,7 +32,7 @@ def test_what_cannot_be_meant_is_wrong_usage(catseye, words, said):
     [
         (["--addresses", "none.toml"], "none.toml"),
         (["--motion-script", "walk"], "is not a readable file"),
-        (["--drop", "ZY999"], "--drop ZY999: unknown ranger"),
+        (["--drop", "ZY999"], "drop ZY999: unknown ranger"),
         (["--keep-out", "none.toml"], "none.toml"),
         (["--journal", "mysql://there/db"], "is unusable"),
     ],

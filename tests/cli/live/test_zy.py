@@ -132,5 +132,5 @@ def test_a_unix_socket_is_served_and_the_laser_is_off_at_boot_unless_asked_for(t
         assert bool(int(heard[-1].split("0x")[1], 16) & StatusWord.LASER_OFF) is not lit
         _, out, err = ended(process, signal.SIGTERM)
         assert out == ""
-        assert ("warning: --laser-at-boot: lasers shine from power-up on" in err) is lit
+        assert ("warning: lasers shine from power-up on (laser at boot)" in err) is lit
     assert list(folder.iterdir()) == []

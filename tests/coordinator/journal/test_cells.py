@@ -5,13 +5,14 @@ import sqlite3
 
 import pytest
 
+from catseye.coordinator.journal.campaign import journal_campaign
 from catseye.coordinator.journal.check import verify_run
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.structure import read_journal_epochs, read_range_series
 from catseye.coordinator.journal.tables import EVENTS, JOURNAL, METADATA, RUN_FILES, RUNS, TEXTS
 from catseye.coordinator.journal.writer import Journal
 from catseye.errors import InputError
-from catseye.gateways.journal.campaign import export_campaign
+from catseye.gateways.journal.campaign import write_campaign
 from catseye.gateways.journal.export import export_tables
 from catseye.service.journals import checked, copied
 from catseye.service.replay import replayed
@@ -90,7 +91,7 @@ READERS = {
         lambda reader, out, chain, number: export_tables(reader, out, runs=[number], forms=["csv"], chains=[chain]),
     ),
     "export a campaign": lambda path: exported(
-        path, lambda reader, out, chain, number: export_campaign(reader, out, run=number, chain=chain)
+        path, lambda reader, out, chain, number: write_campaign(journal_campaign(reader, number, chain=chain), out)
     ),
     "structure": lambda path: read_journal_epochs(str(path)),
     "vibration": lambda path: read_range_series(str(path), ["*"], least=1),

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.gateways.epoch.summary import verdict
 from catseye.reduction.epoch.epoch import reduce_epoch
 
 
@@ -31,7 +30,7 @@ def test_disagreeing_stations_are_noted_and_no_single_thermometer_is_blamed(few_
     assert said in note
     assert "WX1" in note
     assert "WX2" in note
-    assert verdict(reduction).word != "good"
+    assert reduction.verdict.word != "good"
     assert note in reduction.coordinates.doubts
 
 
@@ -42,7 +41,7 @@ def test_a_certificate_a_metre_off_is_noted_with_its_ends_typed_places(few_01):
     (note,) = [n for n in reduction.notes if "disagree" in n]
     assert "typed distance and coordinates" in note
     assert first.target in note
-    assert verdict(reduction).word != "good"
+    assert reduction.verdict.word != "good"
 
 
 def test_humidity_typed_as_a_fraction_is_doubtful_with_both_readings(few_01):
@@ -50,4 +49,4 @@ def test_humidity_typed_as_a_fraction_is_doubtful_with_both_readings(few_01):
     reduction = reduce_epoch(dataclasses.replace(few_01, weather=weather))
     notes = [n for n in reduction.notes if "as a fraction it would be" in n]
     assert [n.split(": ")[1] for n in notes] == ["WX1", "WX2"]
-    assert verdict(reduction).word != "good"
+    assert reduction.verdict.word != "good"

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.live.replay import JournalArgument, run_of
-from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.live.replay import JournalArgument
+from catseye.cli.results import tell
+from catseye.cli.terminal import ProgressLine
 
 journal = typer.Typer(
     no_args_is_help=True,
@@ -30,36 +31,25 @@ def check(
     ] = None,
     head: Annotated[
         list[str] | None,
-        typer.Option("--head", metavar="EVENT:HASH", help="That was told at the time, of the run (again and again)."),
+        typer.Option("--head", metavar="EVENT:HASH", help="Head of the run from the coordinator's log; may repeat."),
     ] = None,
     against: Annotated[
-        str | None, typer.Option("--against", metavar="JOURNAL", help="A copy: where the two part, if they do.")
+        str | None,
+        typer.Option("--against", metavar="JOURNAL", help="Copy to compare, up to where its history differs."),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Hold each event against the chain of hashes: changed, missing, put in, another history, and from where on."""
-    from catseye.gateways.journal.chain import chain_object, chain_verdict, chain_words
-    from catseye.service.journals import checked
+    from catseye.api.journal import check_journal
 
     progress = ProgressLine(quiet)
     try:
-        reports, parting = checked(journal, run_of(run), head or (), against, progress=progress)
+        result = check_journal(journal, run=run, head=head or (), against=against, progress=progress)
     finally:
         progress.clear()
-    verdict = chain_verdict(reports)
-    if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line({"verdict": verdict.to_object(), "runs": [chain_object(r) for r in reports], "against": parting}))
-    elif not quiet:
-        say(wrapped("Verdict", verdict.text))
-        for report in reports:
-            for text in chain_words(report):
-                say(wrapped(f"Run {report.run}", text))
-        for each in parting:
-            say(wrapped(f"Run {each['run']}", str(each["text"])))
-    if verdict.word == "failed" or any(each["parts_at_event"] is not None for each in parting):
+    tell(result, json=json, quiet=quiet)
+    if not result.unaltered:
         raise SystemExit(1)
 
 
@@ -71,25 +61,13 @@ def backup(
     quiet: Quiet = False,
 ) -> None:
     """Copy a journal, also one that is being written, whole or not at all; the copy is checked."""
-    from catseye.gateways.journal.chain import chain_object, chain_verdict, chain_words
-    from catseye.service.journals import copied
+    from catseye.api.journal import backup_journal
 
     progress = ProgressLine(quiet)
     try:
-        reports = copied(journal, copy, progress=progress)
+        result = backup_journal(journal, copy, progress=progress)
     finally:
         progress.clear()
-    verdict = chain_verdict(reports)
-    if json:
-        from catseye.gateways.writers.objects import json_line
-
-        runs = [chain_object(r) for r in reports]
-        say(json_line({"verdict": verdict.to_object(), "copy": str(copy), "bytes": copy.stat().st_size, "runs": runs}))
-    elif not quiet:
-        say(wrapped("Verdict", verdict.text))
-        say(wrapped("Written to", f"{copy}: {copy.stat().st_size / 1e6:.1f} MB."))
-        for report in reports:
-            for text in chain_words(report):
-                say(wrapped(f"Run {report.run}", text))
-    if verdict.word == "failed":
+    tell(result, json=json, quiet=quiet)
+    if result.verdict.word == "failed":
         raise SystemExit(1)

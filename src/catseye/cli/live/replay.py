@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
-from catseye.cli.terminal import ProgressLine, say, wrapped
+from catseye.cli.results import tell
+from catseye.cli.terminal import ProgressLine
 
 JournalArgument = Annotated[str, typer.Argument(metavar="JOURNAL", help="File, or postgresql://USER@HOST/DATABASE.")]
 RunName = Annotated[
@@ -15,7 +16,7 @@ RunName = Annotated[
 
 
 def run_of(text: str | None) -> int | str | None:
-    """Validate the address of a journal."""
+    """Run as the journal's reader takes it: a number, or the beginning of a uuid."""
     return int(text) if text is not None and text.isdecimal() else text
 
 
@@ -35,20 +36,13 @@ def replay(
     quiet: Quiet = False,
 ) -> None:
     """A run again: the same to the last bit, or how far this version or other calibrations move each point."""
-    from catseye.service.replay import replay_object, replay_passages, replay_verdict, replayed
+    from catseye.api.living import replay as replayed
 
     progress = ProgressLine(quiet)
     try:
-        outcome = replayed(journal, run_of(run), calibrations, progress=progress)
+        result = replayed(journal, run=run, calibrations=calibrations, progress=progress)
     finally:
         progress.clear()
-    if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(replay_object(outcome)))
-    elif not quiet:
-        say(wrapped("Verdict", replay_verdict(outcome).text))
-        for title, text in replay_passages(outcome):
-            say(wrapped(title, text))
-    if calibrations is None and not outcome.same:
+    tell(result, json=json, quiet=quiet)
+    if calibrations is None and not result.same:
         raise SystemExit(1)

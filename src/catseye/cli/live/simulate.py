@@ -1,7 +1,7 @@
 """The command that shows it all: a whole site, simulated, its epochs held against the truth."""
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -23,18 +23,10 @@ from catseye.cli.live.options import (
     Site,
     Start,
     leave,
-    mjd_start,
-    orders_of,
-    site_of,
     within,
 )
-from catseye.cli.terminal import say, wrapped
-
-if TYPE_CHECKING:
-    from catseye.service.simulation import Simulation, View
-
-NIGHT = 60_635.125  # MJD: 22 h at Green Bank, no Sun and no Moon that matter
-UNTIL_READY = 12.0  # s that a twin takes to start: its faults' times count from about the first round on
+from catseye.cli.results import tell
+from catseye.cli.terminal import say
 
 
 @app.command(
@@ -44,12 +36,12 @@ UNTIL_READY = 12.0  # s that a twin takes to start: its faults' times count from
 def simulate(  # noqa: PLR0913 - its options are its command line
     site: Site = "gbt",
     minutes: Annotated[
-        float, typer.Option("--minutes", callback=within(0, 1e6, ""), help="Of measuring; 0: until Ctrl-C.")
+        float, typer.Option("--minutes", callback=within(0, 1e6, ""), help="Minutes of measuring; 0: until Ctrl-C.")
     ] = 1.0,
     seed: Seed = 1,
     motion: MotionText = MOTION,
-    fault: Faults = None,
-    start: Start = None,
+    faults: Faults = None,
+    start_mjd: Start = None,
     conditions: Conditions = "night",
     cold: Annotated[bool, typer.Option("--cold", help="Rangers are just powered on: half a minute more.")] = False,
     drop: Drop = None,
@@ -66,52 +58,28 @@ def simulate(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
 ) -> None:
     """A whole site for a minute: twin, rangers, coordinator, and how far its epochs are from the truth."""
-    records = site_of(site)
-    from catseye.service.running import FastLoop, LiveRun
-    from catseye.service.simulation import Simulation
-    from catseye.service.world import TwinWords
+    from catseye.api.living import simulate as simulated
 
-    options: dict[str, Any] = {"seed": seed, "motion": motion, "conditions": conditions, "faults": tuple(fault or ())}
-    begins = mjd_start(start, NIGHT)
-    world = TwinWords(begins, **options) if fast else TwinWords.starting_now(begins, **options).late(UNTIL_READY)
-    free = fast or port_base == 0
-    orders = orders_of(
-        drop=drop,
+    result = simulated(
+        site,
+        minutes=minutes,
+        seed=seed,
+        motion=motion,
+        faults=faults or (),
+        start_mjd=start_mjd,
+        conditions=conditions,
+        cold=cold,
+        drop=drop or (),
         round_s=round_s,
-        filter=filter_,
+        filter_=filter_,
         journal=journal,
         keep_buffers=keep_buffers,
-        port=0 if port is None and free else port,
+        port_base=port_base,
+        port=port,
+        fast=fast,
+        end_on_signals=True,
+        tell=None if quiet or json else say,
+        screen=not quiet and sys.stderr is not None and sys.stderr.isatty(),
     )
-    simulation = Simulation(
-        records, site, world, orders, minutes, _view(json=json, quiet=quiet), port_base=port_base, warm=not cold
-    )
-    work = simulation.run_fast if fast else simulation.run
-    run: LiveRun[None] = LiveRun(work, loop_factory=FastLoop if fast else None)
-    run.result()
-    _say(simulation, json=json, quiet=quiet)
-    leave(run)
-
-
-def _view(*, json: bool, quiet: bool) -> "View":
-    """A screen on a terminal, lines where none is, nothing where none is wanted."""
-    from catseye.service.screen import LinesView, ScreenView, SilentView
-
-    if not quiet and sys.stderr is not None and sys.stderr.isatty():
-        return ScreenView()
-    return SilentView() if quiet or json else LinesView(say)
-
-
-def _say(simulation: "Simulation", *, json: bool, quiet: bool) -> None:
-    from catseye.service.objects import simulation_object, simulation_verdict, summary
-
-    book, world, journal = simulation.book, simulation.world, simulation.orders.journal
-    totals = simulation.totals
-    if json:
-        from catseye.gateways.writers.objects import json_line
-
-        say(json_line(simulation_object(book, world, journal, **totals)))
-    elif not quiet:
-        say(wrapped("Verdict", simulation_verdict(book).text))
-        for title, text in summary(book, world, journal, **totals):
-            say(wrapped(title, text))
+    tell(result, json=json, quiet=quiet)
+    leave(result.signal)

@@ -92,7 +92,7 @@ def recover(damaged: Path, new: Path) -> Recovery:
                 target.executescript("".join(f"DROP TABLE {table.name};" for table in OF_CHAINS))
     except (OSError, ValueError, sqlite3.Error) as problem:
         raise InputError(
-            f"journal {damaged}: cannot be recovered: {problem} (expected disk space beside --out)"
+            f"journal {damaged}: cannot be recovered: {problem} (expected disk space beside the output)"
         ) from problem
     if not recovery.rows:
         raise InputError(f"journal {damaged}: no readable row in {recovery.pages} pages (use its backup)")

@@ -9,12 +9,10 @@ from catseye.constants import MILLIMETRE
 from catseye.estimation.quality.propagation import Input, agreement
 from catseye.gateways.epoch.summary import MEANING
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.budget.explanation import Explanation
 
 MICROMETRE = 1e-6
-LIKELY_SLIP = 1e-6  # least probability of a wrong cycle count that is reported
 SMALLEST_SHARE = 5e-5  # of a row in the text table
 START_OF_MJD = datetime(1858, 11, 17)
 
@@ -29,7 +27,7 @@ def explanation_object(explanation: Explanation, seed: int | None = None) -> dic
     """
     budget, cycles = explanation.budget, explanation.cycles
     return {
-        "verdict": explanation_verdict(explanation).to_object(),
+        "verdict": explanation.verdict.to_object(),
         "shot": explanation.shot,
         "ranger": explanation.ranger,
         "target": explanation.target,
@@ -56,24 +54,6 @@ def explanation_object(explanation: Explanation, seed: int | None = None) -> dic
         "references": [{"shot": s, "after": after, "weight": w} for s, after, w in explanation.references],
         "notes": list(explanation.notes),
     }
-
-
-def explanation_verdict(explanation: Explanation) -> Verdict:
-    """Verdict on the shot's range from its own chain and the network."""
-    if explanation.budget is None:
-        if explanation.status == "reference":
-            return Verdict("good", "a reference shot, which tracks the electronics and has no range")
-        return Verdict("failed", f"no range: {explanation.reason or explanation.status}")
-    if explanation.reason:
-        return Verdict("doubtful", f"excluded from the adjustment: {explanation.reason}")
-    if explanation.cycles is not None and float(explanation.cycles.slip_probability) > LIKELY_SLIP:
-        chance = float(explanation.cycles.slip_probability)
-        return Verdict("doubtful", f"the number of whole cycles is wrong with a probability of {chance:.1e}")
-    if explanation.scattered is not None and agreement(explanation.budget, explanation.scattered, digits=1) is False:
-        return Verdict("doubtful", "the budget differs from its Monte Carlo: use the Monte Carlo")
-    if explanation.adjusted is None:
-        return Verdict("doubtful", "there is no adjustment to check it")
-    return Verdict("good", "used in the adjustment, which confirms it")
 
 
 def _inputs(explanation: Explanation) -> list[dict[str, Any]]:
@@ -292,5 +272,5 @@ def budget_lines(explanation: Explanation) -> list[str]:
     if small:
         size = float(np.sqrt(np.sum(budget.contribution[small] ** 2))) / MICROMETRE
         share = 100.0 * float(budget.share[small].sum())
-        lines.append(f"{share:7.2f} {size:7.2f}  {len(small)} smaller inputs (--json or --page)")
+        lines.append(f"{share:7.2f} {size:7.2f}  {len(small)} smaller inputs (JSON and page have them)")
     return [*lines, f"{100.0:7.2f} {budget.u / MICROMETRE:7.2f}  together"]

@@ -11,7 +11,6 @@ from catseye.gateways.epoch.explain import (
     SMALLEST_SHARE,
     distribution,
     explanation_passages,
-    explanation_verdict,
     metres,
     micrometres,
     when,
@@ -52,7 +51,7 @@ def explanation_page(explanation: Explanation, campaign: Campaign, made_at: date
         f"explained by catseye on {made_at:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>"
     )
     words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in explanation_passages(explanation))
-    body = [header, verdict_line(explanation_verdict(explanation)), _cards(explanation), f"<dl>{words}</dl>"]
+    body = [header, verdict_line(explanation.verdict), _cards(explanation), f"<dl>{words}</dl>"]
     if explanation.budget is not None:
         drawn = svgs(figures(explanation))
         body += [

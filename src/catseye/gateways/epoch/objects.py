@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catseye.constants import PPM
-from catseye.gateways.epoch.summary import verdict
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.output import FORMAT
 from catseye.records.files.covariance_file import KEY
@@ -33,7 +32,7 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
         points[name] = {"x": x, "y": y, "z": z, "covariance": covariance, "shots": coordinates.shots[row]}
     total, used, rejected = len(reduction.status), reduction.status.count("used"), len(reduction.rejected)
     return {
-        "verdict": verdict(reduction).to_object(),
+        "verdict": reduction.verdict.to_object(),
         "campaign": reduction.campaign.site.campaign.name,
         "frame": "ground",
         "status": coordinates.status,

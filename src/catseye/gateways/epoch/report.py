@@ -10,7 +10,7 @@ from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.epoch.figures import crowded, figures
 from catseye.gateways.epoch.objects import benchmark_object, matrix_file
-from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing, trust_limits, verdict
+from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing
 from catseye.gateways.epoch.tables import kinds_of
 from catseye.gateways.epoch.ways import dish_estimates_table
 from catseye.gateways.writers.drawing import svg
@@ -21,6 +21,7 @@ from catseye.reduction.air.group_index import benchmark_refractometers
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
 from catseye.reduction.epoch.surface import UNOBSERVED
+from catseye.reduction.epoch.verdict import factor_spread
 
 CONTENTS = {
     "summary": "Summary",
@@ -52,7 +53,7 @@ def report(reduction: Reduction, when: datetime, progress: Progress | None = Non
     )
     body = [
         header,
-        verdict_line(verdict(reduction)),
+        verdict_line(reduction.verdict),
         _summary(reduction),
         _feed_arm(reduction, drawn),
         _dish(reduction, drawn),
@@ -81,7 +82,7 @@ def pictures(reduction: Reduction, progress: Progress | None = None) -> dict[str
 def _summary(reduction: Reduction) -> str:
     coordinates, surface = reduction.coordinates, reduction.surface
     count, rows = Counter(reduction.status), feed_arm_rows(reduction)
-    _, spread = trust_limits(reduction)
+    spread = factor_spread(reduction.coordinates.degrees_of_freedom)
     cards = [
         card(
             "Ranges used",

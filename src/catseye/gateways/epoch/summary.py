@@ -5,17 +5,13 @@ from collections import Counter
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
-from catseye.estimation.least_squares.status import CONVERGED
 from catseye.gateways.epoch.tables import kinds_of
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import Verdict
 from catseye.records.night.campaign import REFERENCE
-from catseye.records.site.validity import expired_of_site
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
+from catseye.reduction.epoch.verdict import factor_spread
 
-TOO_WIDE = 0.5  # variance factor: claims 1.4 times the scatter; complete nights of two generators have at least 0.77
-MOST_REJECTED = 0.1  # share of all shots in a usual night
 MEANING = {
     "blocked": "no return",
     "reflected": "stray reflection",
@@ -26,45 +22,6 @@ MEANING = {
     "bad reference": "obstruction in the beam of the internal cube",
     "no reference": "the drift of the electronics is unknown",
 }
-
-
-def verdict(reduction: Reduction) -> Verdict:
-    """Verdict from scatter against the claim, rejected shots, and the exported campaign's verdict."""
-    return _own_verdict(reduction).resting_on({"the exported campaign": reduction.campaign.verdict})
-
-
-def _own_verdict(reduction: Reduction) -> Verdict:
-    coordinates = reduction.coordinates
-    factor, degrees = coordinates.variance_factor, coordinates.degrees_of_freedom
-    if coordinates.status != CONVERGED:
-        return Verdict("failed", f"the adjustment did not converge: {coordinates.status}")
-    if not (np.isfinite(factor) and degrees >= 1.0):
-        return Verdict("doubtful", "nothing was measured twice, so the claimed uncertainties are unchecked")
-    _, spread = trust_limits(reduction)
-    if factor > 1.0 + 2.0 * spread:
-        more = 100.0 * (np.sqrt(factor) - 1.0)
-        return Verdict("doubtful", f"the measurements scatter {more:.0f} % more than their uncertainties claim")
-    if factor < TOO_WIDE - 2.0 * spread:
-        less = 100.0 * (1.0 - np.sqrt(factor))
-        return Verdict(
-            "doubtful",
-            f"the measurements scatter {less:.0f} % less than their uncertainties claim: check the units",
-        )
-    shots, rejected = len(reduction.status), len(reduction.rejected)
-    if rejected > MOST_REJECTED * shots:
-        return Verdict("doubtful", f"{rejected} of {shots} shots were rejected, over {100.0 * MOST_REJECTED:.0f} %")
-    count = Counter(reduction.status)
-    if count[ShotStatus.UNDECIDED]:
-        return Verdict(
-            "doubtful",
-            f"{count[ShotStatus.UNDECIDED]} shots contradict each other, and the wrong ones cannot be identified",
-        )
-    if coordinates.doubts:
-        return Verdict("doubtful", coordinates.doubts[0])
-    if expired_records := expired_of_site(reduction.campaign):
-        return Verdict("doubtful", "; ".join(expired_records))
-    says = "as their uncertainties claim" if factor >= 1.0 - 2.0 * spread else "less than their uncertainties claim"
-    return Verdict("good", f"the measurements scatter {says}, and {rejected} of {shots} shots were rejected")
 
 
 def passages(reduction: Reduction) -> list[Passage]:
@@ -99,12 +56,6 @@ def pointing(reduction: Reduction) -> tuple[float, float] | None:
     nominal = reduction.campaign.site.campaign.azimuth_deg
     azimuth = float(np.arctan2(x, y)) / DEGREE
     return nominal + (azimuth - nominal + 180.0) % 360.0 - 180.0, float(np.arcsin(z)) / DEGREE
-
-
-def trust_limits(reduction: Reduction) -> tuple[float, float]:
-    """Expectation and standard deviation of the variance factor."""
-    degrees = reduction.coordinates.degrees_of_freedom
-    return 1.0, float(np.sqrt(2.0 / degrees)) if degrees > 0.0 else float("nan")
 
 
 def _night(reduction: Reduction) -> str:
@@ -187,7 +138,7 @@ def _trust(reduction: Reduction) -> str:
     factor, degrees = reduction.coordinates.variance_factor, reduction.coordinates.degrees_of_freedom
     if not (np.isfinite(factor) and degrees >= 1.0):
         return "Nothing was measured twice, so the claimed uncertainties are unchecked."
-    _, spread = trust_limits(reduction)
+    spread = factor_spread(degrees)
     ratio = 100.0 * (np.sqrt(factor) - 1.0)
     if abs(factor - 1.0) <= 2.0 * spread:
         verdict = "the measurements scatter as their uncertainties claim"

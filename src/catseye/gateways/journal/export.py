@@ -53,7 +53,7 @@ def export_tables(
     """
     reader.left_out = {chain.run: chain.bad for chain in chains}
     if not runs or not forms:
-        raise InputError(f"--out {out}: no run or no form given (expected at least one of each)")
+        raise InputError(f"{out}: no run or no form given (expected at least one of each)")
     stored = [reader.run(run) for run in runs]
     counts = dict.fromkeys(TABLES, 0)
     with atomic_directory(out, Path(reader.place)) as directory:

@@ -12,7 +12,7 @@ from catseye.coordinator.journal.entries import Entry, EpochSolution
 from catseye.coordinator.journal.reader import Kind
 from catseye.gateways.writers.cells import harmless
 from catseye.gateways.writers.columns import Column, Table, Values, each
-from catseye.records.night.live import TICKS_PER_DAY
+from catseye.ranger.line import stamp_text
 
 PAGE = "journal.md"
 NAN = float("nan")
@@ -87,7 +87,7 @@ RUN = (
         "mjd_utc",
         "d",
         "time, Modified Julian Date; FITS has it as a double in DMJD and exactly in TICKS",
-        each(lambda r: stamp(r.ticks)),
+        each(lambda r: stamp_text(r.ticks)),
         fits="DMJD",
         kind="s",
     ),
@@ -105,16 +105,6 @@ class ExportTable:
 
 def _table(name: str, *columns: ExportColumn) -> Table[Sequence[ExportRow]]:
     return Table(f"{name}.csv", PAGE, (*RUN, *columns))
-
-
-def stamp(ticks: int) -> str:
-    """MJD with the eight decimals of a tick, exact.
-
-    >>> stamp(5288912500001)
-    '52889.12500001'
-    """
-    day, fraction = divmod(ticks, TICKS_PER_DAY)
-    return f"{day}.{fraction:08d}"
 
 
 def ticks_of(entry: Entry) -> int:

@@ -165,12 +165,7 @@ def atomic_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
     pieces: list[str] = []
     with undo_on_interruption(Unfinished(str(fresh))):
         try:
-            if where.is_dir():
-                raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
-            if where.exists():
-                with where.open("rb") as stream:
-                    if mark.encode() not in stream.read(4096):
-                        raise InputError(f"{option} {path}: exists and is not a catseye file (expected a new name)")
+            refuse_file(path, option, mark)
             yield pieces
             fresh.write_text("".join(pieces), encoding="utf-8")
             with deferred():
@@ -179,6 +174,17 @@ def atomic_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
             raise InputError(f"{option} {path}: cannot be written: {problem.strerror or problem}") from problem
         finally:
             fresh.unlink(missing_ok=True)
+
+
+def refuse_file(path: Path, option: str, mark: str) -> None:
+    """Raise InputError for a file that `atomic_file` would not replace; arguments as for it."""
+    where = path.resolve()
+    if where.is_dir():
+        raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
+    if where.exists():
+        with where.open("rb") as stream:
+            if mark.encode() not in stream.read(4096):
+                raise InputError(f"{option} {path}: exists and is not a catseye file (expected a new name)")
 
 
 def refuse_suffix(path: Path, option: str) -> None:

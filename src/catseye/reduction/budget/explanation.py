@@ -10,7 +10,7 @@ import numpy as np
 from catseye.aliases import Progress
 from catseye.constants import MILLIMETRE, TWO_PI
 from catseye.errors import EstimationError, InputError
-from catseye.estimation.quality.propagation import STUDENT, Budget, Scattered, monte_carlo, propagate
+from catseye.estimation.quality.propagation import STUDENT, Budget, Scattered, agreement, monte_carlo, propagate
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.budget.chain import drawing, measurement
@@ -24,7 +24,9 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.telescope_track import at_middle_posture, moved_ends
 from catseye.reduction.site.places import RangedPoint, places_of
 from catseye.signal.cycles.whole import CycleDecision, decision, unwrapped_length
+from catseye.verdict import Verdict
 
+LIKELY_SLIP = 1e-6  # probability of a wrong cycle count above which the range is doubtful
 CHECKED = 0.05  # redundancy below which the other shots do not determine a target
 
 
@@ -87,6 +89,24 @@ class Explanation:
     adjusted: AdjustedShot | None = None
     references: tuple[tuple[int, float, float], ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the shot's range from its own chain and the network."""
+        if self.budget is None:
+            if self.status == "reference":
+                return Verdict("good", "a reference shot, which tracks the electronics and has no range")
+            return Verdict("failed", f"no range: {self.reason or self.status}")
+        if self.reason:
+            return Verdict("doubtful", f"excluded from the adjustment: {self.reason}")
+        if self.cycles is not None and float(self.cycles.slip_probability) > LIKELY_SLIP:
+            chance = float(self.cycles.slip_probability)
+            return Verdict("doubtful", f"the number of whole cycles is wrong with a probability of {chance:.1e}")
+        if self.scattered is not None and agreement(self.budget, self.scattered, digits=1) is False:
+            return Verdict("doubtful", "the budget differs from its Monte Carlo: use the Monte Carlo")
+        if self.adjusted is None:
+            return Verdict("doubtful", "there is no adjustment to check it")
+        return Verdict("good", "used in the adjustment, which confirms it")
 
 
 def explain_shot(

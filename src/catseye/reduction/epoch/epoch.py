@@ -13,7 +13,9 @@ from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.surface import DishFit, fit_surface
 from catseye.reduction.epoch.telescope_track import at_middle_posture
+from catseye.reduction.epoch.verdict import campaign_verdict
 from catseye.reduction.site.places import sheet_notes
+from catseye.verdict import Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,11 @@ class Reduction:
     status: tuple[ShotStatus, ...]
     rejected: dict[int, Reason]
     notes: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict from scatter against the claim, rejected shots, and the exported campaign's verdict."""
+        return campaign_verdict(self.campaign, self.coordinates, self.status, len(self.rejected))
 
     def held(self) -> "Reduction":
         """Reduction with its point covariance cached.
@@ -82,15 +89,15 @@ def reduce_epoch(
         *([missing] if missing else []),
     ]
     return Reduction(
-        campaign,
-        settings,
-        phases,
-        electronics,
-        coordinates,
-        surface,
-        status,
-        {int(campaign.shots.shot[k]): reasons[k] for k in sorted(reasons)},
-        tuple(notes),
+        campaign=campaign,
+        settings=settings,
+        phases=phases,
+        electronics=electronics,
+        coordinates=coordinates,
+        surface=surface,
+        status=status,
+        rejected={int(campaign.shots.shot[k]): reasons[k] for k in sorted(reasons)},
+        notes=tuple(notes),
     )
 
 

@@ -7,7 +7,8 @@
     table FILE                         CSV with the header mjd,azimuth_deg,elevation_deg; smooth between, constant
                                        outside
 
-Azimuths are clockwise from north and count on past a turn; elevations are 5 to 95 degrees (a track: to 89).
+Azimuths are clockwise from north and count on past a turn, -540 to 540 degrees;
+elevations are 5 to 95 degrees (a track: to 89).
 """
 
 import csv
@@ -23,6 +24,7 @@ from catseye.constants import DEGREE, SECONDS_PER_DAY, TWO_PI
 from catseye.errors import InputError
 
 LOWEST_DEG, HIGHEST_DEG = 5.0, 95.0
+FARTHEST_DEG = 540.0  # azimuth: a turn and a half either way, more than any telescope's cable wrap
 TRACK_CLEARANCE_DEG = 1.0  # of the zenith: azimuth then turns at 11 degrees a minute at most
 SIDEREAL_DAY = 86_164.098_903_69  # s of UT1: a turn of the Earth against the stars, IAU 2000
 FASTEST = np.array([35.2, 17.6]) * DEGREE / 60.0  # rad/s, azimuth, elevation
@@ -76,7 +78,12 @@ class AxisMotion(ABC):
         return Scan((n[0], n[1]), n[2], n[3])
 
 
-def _refuse_elevation(elevation_deg: float, where: str, highest: float = HIGHEST_DEG) -> None:
+def _refuse_posture(posture_deg: tuple[float, float], where: str, highest: float = HIGHEST_DEG) -> None:
+    azimuth_deg, elevation_deg = posture_deg
+    if not abs(azimuth_deg) <= FARTHEST_DEG:
+        raise InputError(
+            f"{where}: azimuth {azimuth_deg:g} is outside {-FARTHEST_DEG:g} to {FARTHEST_DEG:g} (degrees): name another"
+        )
     if not LOWEST_DEG <= elevation_deg <= highest:
         raise InputError(
             f"{where}: elevation {elevation_deg:g} is outside {LOWEST_DEG:g} to {highest:g} (degrees): name another"
@@ -96,8 +103,8 @@ class TelescopeSlew(AxisMotion):
     end_deg: tuple[float, float]
 
     def __post_init__(self) -> None:
-        _refuse_elevation(self.start_deg[1], "slew")
-        _refuse_elevation(self.end_deg[1], "slew")
+        _refuse_posture(self.start_deg, "slew")
+        _refuse_posture(self.end_deg, "slew")
 
     def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         axes = []
@@ -136,7 +143,7 @@ class SkyTrack(AxisMotion):
     start_deg: tuple[float, float]
 
     def __post_init__(self) -> None:
-        _refuse_elevation(self.start_deg[1], "track", 90.0 - TRACK_CLEARANCE_DEG)
+        _refuse_posture(self.start_deg, "track", 90.0 - TRACK_CLEARANCE_DEG)
 
     def angles(self, seconds: Array, *, latitude: float, start_mjd: float) -> AxisAngles:
         a, e = np.array(self.start_deg) * DEGREE
@@ -205,7 +212,7 @@ class Scan(AxisMotion):
     rate_deg_min: float
 
     def __post_init__(self) -> None:
-        _refuse_elevation(self.middle_deg[1], "scan")
+        _refuse_posture(self.middle_deg, "scan")
         if not (0.0 < self.width_deg <= 360.0 and 0.0 < self.rate_deg_min <= 35.2):
             raise InputError(
                 f"scan: width {self.width_deg:g} degrees at {self.rate_deg_min:g} degrees a minute (expected 0 to 360 "
@@ -279,9 +286,9 @@ def read_table(path: Path) -> PostureTable:
             raise InputError(f"motion table {path}, line {number}: {','.join(row)!r} is not three numbers") from None
         if values and not mjd > values[-1][0]:
             raise InputError(f"motion table {path}, line {number}: mjd {mjd} is not after the line before")
-        if not (np.isfinite(mjd) and abs(azimuth) <= 540.0):
-            raise InputError(f"motion table {path}, line {number}: azimuth {azimuth:g} (expected -540 to 540 degrees)")
-        _refuse_elevation(elevation, f"motion table {path}, line {number}")
+        if not np.isfinite(mjd):
+            raise InputError(f"motion table {path}, line {number}: mjd {mjd:g} (expected a number)")
+        _refuse_posture((azimuth, elevation), f"motion table {path}, line {number}")
         values.append((mjd, azimuth, elevation))
     if len(values) < 2:
         raise InputError(f"motion table {path}: {len(values)} postures (expected at least 2)")

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from catseye.gateways.epoch.summary import verdict
 from catseye.records.night.jitter import JitterRow, jitter_table
 from catseye.reduction.epoch.epoch import reduce_epoch
 
@@ -11,8 +10,8 @@ def test_a_jitter_of_millimetres_typed_for_tenths_is_doubtful(night_01):
     """3 mm of sway that is not there: the variance factor is 0.23."""
     start = float(night_01.shots.mjd_utc[0])
     shaken = jitter_table([JitterRow(mjd_utc=start, body="arm", u_mm=3.0)])
-    found = verdict(reduce_epoch(replace(night_01, jitter=shaken)))
+    found = reduce_epoch(replace(night_01, jitter=shaken)).verdict
     assert found.word == "doubtful"
     assert "52 % less than their uncertainties claim" in found.why
     assert "check the units" in found.why
-    assert verdict(reduce_epoch(night_01)).word == "good"
+    assert reduce_epoch(night_01).verdict.word == "good"

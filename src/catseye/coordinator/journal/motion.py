@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from catseye.constants import DEGREE, SECONDS_PER_DAY
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.errors import InputError
-from catseye.gateways.journal.tables import stamp
+from catseye.ranger.line import stamp_text
 from catseye.records.night.jitter import JITTER, LARGEST_MM, JitterRow
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.night.postures import NEAREST, POSTURES, PostureRow
@@ -123,7 +123,7 @@ class JournalMotion:
         try:
             return tuple(
                 JitterRow.model_validate(
-                    {"mjd_utc": float(stamp(ticks)), "body": body, "u_mm": math.hypot(mm, bent.get(body, 0.0))}
+                    {"mjd_utc": float(stamp_text(ticks)), "body": body, "u_mm": math.hypot(mm, bent.get(body, 0.0))}
                 )
                 for (ticks, body), mm in sorted(jitter.items())
             )
@@ -142,7 +142,7 @@ def _jump(reads: list[LivePosture]) -> str:
         apart = max(turned, abs(after.elevation - before.elevation))
         if apart > STEADY + FASTEST * seconds:
             jumped = f"the telescope moved by {apart / DEGREE:.3f} deg in {seconds:.3f} s"
-            return f"{jumped}, by the posture at {stamp(after.ticks)}: postures are invalid"
+            return f"{jumped}, by the posture at {stamp_text(after.ticks)}: postures are invalid"
     return ""
 
 
@@ -151,7 +151,7 @@ def _row(read: LivePosture) -> PostureRow:
         value / DEGREE for value in (read.azimuth, read.elevation, read.azimuth_rate, read.elevation_rate)
     )
     return PostureRow(
-        mjd_utc=float(stamp(read.ticks)),
+        mjd_utc=float(stamp_text(read.ticks)),
         azimuth_deg=azimuth,
         elevation_deg=elevation,
         azimuth_rate_deg_s=rates[0],
