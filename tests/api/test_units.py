@@ -24,7 +24,13 @@ from catseye.errors import InputError
 from catseye.reduction.baseline.settings import BaselineSettings
 
 NUMBERS = re.compile(r"\b(float|int|complex|object|Any|ndarray|NDArray|ArrayLike|number|Number|Quantity)\b")
-OUR_OWN = {  # functions that people do not call: what goes in is catseye's own numbers
+OUR_OWN = {  # functions that people do not call: what goes in is catseye's own numbers, or a command line's
+    *(f"catseye.api.journal.{name}" for name in ("run_of", "mjd_argument")),
+    *(
+        f"catseye.api.serving.{name}"
+        for name in ("zy", "coordinator_orders", "mjd_start", "within", "twin_options", "twin_world")
+    ),
+    "catseye.api.result.json_text",
     "catseye.api.result.quantities",
     *(f"catseye.api.units.{name}" for name in ("with_units", "plain_arguments", "declared", "plain", "unit_of_name")),
 }
@@ -118,6 +124,7 @@ def test_the_unit_declared_is_the_one_of_the_name(function, argument, unit):
             "m / s2",
             "min",
             "mrad / h(1/2)",
+            "mjd",
         )  # no ending: SI, a pure number, or said whole
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 def glass_object(state: "GlassState") -> dict[str, Any]:
     """Object of one glass that `catseye glass NAME --json` prints."""
     glass = state.glass
-    numbers = {key: value for key, value in vars(state).items() if key not in ("name", "glass", "prism", "others")}
+    numbers = {key: value for key, value in vars(state).items() if isinstance(value, float)}
     return {
         "verdict": state.verdict.to_object(),
         "name": state.name,
