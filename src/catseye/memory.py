@@ -99,8 +99,8 @@ def _size(count: float) -> str:
 
 def _in_use() -> int:
     """Peak address space in bytes, to which a limit applies; peak memory where unknown."""
-    with suppress(OSError, ValueError, StopIteration), open("/proc/self/status", encoding="ascii") as status:
-        return 1024 * int(next(line for line in status if line.startswith("VmPeak")).split()[1])
+    with suppress(OSError, ValueError, StopIteration), open("/proc/self/status", encoding="ascii") as lines:
+        return 1024 * int(next(line for line in lines if line.startswith("VmPeak")).split()[1])
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 

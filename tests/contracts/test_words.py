@@ -65,6 +65,75 @@ def test_no_reason_and_no_parameter_is_read_from_its_text(room):
     assert found == {}
 
 
+SENTENCES = {"status", "why", "reason", "message", "note", "notes", "doubt", "doubts", "texts"}  # names of sentences
+SEARCHES = {*READERS, "replace", "find", "index", "search", "match", "fullmatch", "findall", "finditer"}
+OF_OTHERS = {  # sentences of other libraries, whose errors carry no data
+    "records/files/reading.py: str(problem).rpartition(' (at ')",  # tomllib of Python 3.11: line and column
+    "records/files/refusal.py: message.startswith('expected')",  # pydantic's, before it is quoted
+}
+
+
+def is_sentence(node, problems):
+    """True for text of a caught error, or for something named as a sentence, or a part of either."""
+    if isinstance(node, ast.Call) and ast.unparse(node.func) == "str" and node.args:
+        return isinstance(node.args[0], ast.Name) and node.args[0].id in problems
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        return node.func.attr in {*SEARCHES, "lower", "strip", "rstrip"} and is_sentence(node.func.value, problems)
+    if isinstance(node, ast.Subscript):
+        return is_sentence(node.value, problems)
+    name = node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+    return name in SENTENCES
+
+
+def decided_by_sentence(tree):
+    """Places where code looks into a sentence: it should ask for a value."""
+    problems = {node.name for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler) and node.name}
+    loops = {  # names that run over sentences
+        node.target.id: node.iter
+        for node in ast.walk(tree)
+        if isinstance(node, ast.For | ast.comprehension) and isinstance(node.target, ast.Name)
+    }
+    running = {name for name, over in loops.items() if is_sentence(over, problems)}
+
+    def spoken(node):
+        return is_sentence(node, problems) or (isinstance(node, ast.Name) and node.id in running)
+
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in SEARCHES:
+            looks = spoken(node.func.value) or any(spoken(each) for each in node.args)
+            if looks and (node.args or node.func.attr not in ("split", "rsplit")):  # split() only mends spaces
+                yield ast.unparse(node)
+        elif isinstance(node, ast.Compare) and any(isinstance(each, ast.In | ast.NotIn) for each in node.ops):
+            left = node.left
+            fixed = isinstance(left, ast.Constant | ast.JoinedStr) or (isinstance(left, ast.Name) and left.id.isupper())
+            if fixed and any(spoken(each) for each in node.comparators):
+                yield ast.unparse(node)
+
+
+def test_no_sentence_is_read_back():
+    found = {
+        f"{path.relative_to(SOURCE).as_posix()}: {place}"
+        for path, tree in TREES.items()
+        if not path.is_relative_to(SOURCE / "ranger")  # answers of rangers are words of their language
+        for place in decided_by_sentence(tree)
+    }
+    assert found == OF_OTHERS
+
+
+def test_sentences_read_back_are_seen():
+    for text in (
+        "solution.status.startswith(CONVERGED)",
+        "any(note.startswith('no paraboloid') for note in found.notes)",
+        "[t for t in allowance.texts if not t.startswith('the stations differ')]",
+        "'needs' in outcome.message",
+        "try: f()\nexcept E as problem: why = str(problem).replace('no ranger', 'no feed')",
+        "try: f()\nexcept E as problem: found = re.search('number ([0-9]+)', str(problem))",
+    ):
+        assert list(decided_by_sentence(ast.parse(text))), text
+    for text in ("name.startswith('ZBM')", "why.split()", "status in (FOUND, LOST)", "kind in reply.text"):
+        assert not list(decided_by_sentence(ast.parse(text))), text
+
+
 def test_such_reading_is_seen():
     for text in ("reason.partition(':')", "row.reason.startswith('blocked')", "parameter[:-2]", "reasons[k].split()"):
         assert list(read_back(ast.parse(text))), text

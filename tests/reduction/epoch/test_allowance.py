@@ -18,6 +18,7 @@ from catseye.reduction.epoch.allowance import (
     STEEPEST_UP,
     UNPLACED,
     Allowance,
+    AllowanceReason,
     for_the_air,
     refused,
 )
@@ -108,7 +109,7 @@ def test_half_of_all_zeros_are_not_wrong_at_once_but_one_may_be(wrong, rangers, 
 
 
 def test_what_was_refused_before_stays_refused():
-    before = Allowance(held=frozenset([thermometer("WX2")]), texts=("before",), families={TIME: 0.2})
+    before = Allowance(held=frozenset([thermometer("WX2")]), reasons=(AllowanceReason("before"),), families={TIME: 0.2})
     found = refused(before, {thermometer("WX1"): 10.0}, field(), KNOWN, 12)
     assert found.held == {thermometer("WX1"), thermometer("WX2")}
     assert found.texts[0] == "before"

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE
-from catseye.reduction.epoch.allowance import Allowance
+from catseye.reduction.epoch.allowance import Allowance, AllowanceReason
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.self_check import LENGTH
 from catseye.reduction.epoch.telescope_motion import TelescopeKnots
@@ -222,7 +222,7 @@ def test_epoch_allowances_are_reported_and_covered_as_in_a_campaign(settled, mon
     night, live, feed = settled
     feed.into(live)
     plain = copy.deepcopy(live).solve(night.ticks(3))
-    found = Allowance(families={LENGTH: 0.3}, texts=("the ranges err in common by length",))
+    found = Allowance(families={LENGTH: 0.3}, reasons=(AllowanceReason("the ranges err in common by length"),))
     monkeypatch.setattr("catseye.reduction.epoch.self_check.FEWEST", 4)  # a round of six rangers has few shots
     monkeypatch.setattr("catseye.reduction.live.epoch.allowed", lambda settled: found)
     covered = live.solve(night.ticks(3))

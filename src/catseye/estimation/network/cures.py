@@ -32,10 +32,10 @@ NAMED = 3  # observations in a sentence
 NEARER = 10.0  # ratio of squares: of several exchanges that fit, the one closest to the given coordinates
 HALF_TURN = 0.01  # rad from pi, within which an angle's error counts as half a turn
 TURNING = ("direction", "angle", "azimuth")  # kinds with a sense of rotation
-MIRRORED = "the sense of the horizontal angles is mirrored: reversed, the variance factor is {factor}"
-EXCHANGED = "with {first} and {second} exchanged the variance factor is {factor}"
-WITHOUT = "without {names} the variance factor is {factor}"
-OPPOSITE = "{names} is half a turn off: without it the variance factor is {factor}"
+MIRRORED = "the sense of the horizontal angles is mirrored: reversed,"
+EXCHANGED = "with {first} and {second} exchanged"
+WITHOUT = "without {names}"
+OPPOSITE = "{names} is half a turn off: without it"
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def reason(solution: NetworkSolution, adjust: Adjust | None) -> NetworkReason:
         least = min(cure.changes for cure in cures)
         best = [cure for cure in cures if cure.changes == least]
         if len(best) == 1:
-            return NetworkReason(f"; {best[0].text.replace('{factor}', f'{best[0].factor:.3g}')}", named=True)
+            return NetworkReason(f"; {best[0].text} the variance factor is {best[0].factor:.3g}", named=True)
     return NetworkReason(_where(solution), named=False)
 
 

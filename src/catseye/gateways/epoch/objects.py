@@ -134,8 +134,7 @@ def pose_object(reduction: "Reduction") -> dict[str, Any]:
     nominal = {"azimuth_deg": posture.azimuth_deg, "elevation_deg": posture.elevation_deg}
     common = {"format": FORMAT, "campaign": posture.name, "nominal_posture": nominal}
     if surface is None:
-        reason = next((note for note in reduction.notes if note.startswith("no paraboloid")), "no dish prisms")
-        return {**common, "pose": None, "reason": reason, "paraboloid": None}
+        return {**common, "pose": None, "reason": reduction.no_surface, "paraboloid": None}
     return {
         **common,
         **surface.pose(),

@@ -149,8 +149,7 @@ def _feed_arm(reduction: Reduction, drawn: dict[str, str]) -> str:
 def _dish(reduction: Reduction, drawn: dict[str, str]) -> str:
     surface, aim = reduction.surface, pointing(reduction)
     if surface is None or aim is None:
-        reasons = [note for note in reduction.notes if note.startswith("no paraboloid")]
-        return section("dish", CONTENTS["dish"], paragraph(f"No pose and no surface: {'; '.join(reasons)}."))
+        return section("dish", CONTENTS["dish"], paragraph(f"No pose and no surface: {reduction.no_surface}."))
     pose, u = surface.pose(), np.sqrt(np.diag(surface.fit.covariance))
     posture = reduction.campaign.site.campaign
     motion = [

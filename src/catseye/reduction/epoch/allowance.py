@@ -8,6 +8,7 @@ what is allowed for: a family of `self_check`, or the air between the stations.
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,17 @@ UNPLACED = 80.0  # m, each of east and north, from the middle of the site to a s
 DOUBTED_C = 2.5  # prior u of a thermometer's offset from which it is doubted, before it is refuted
 
 
+class AllowanceReason(NamedTuple):
+    """Reason for an allowance.
+
+    text      a sentence
+    subject   parameter that it judges to be off; None for one that judges none
+    """
+
+    text: str
+    subject: Parameter | None = None
+
+
 @dataclass(frozen=True)
 class Allowance:
     """Allowances beyond the records.
@@ -35,14 +47,19 @@ class Allowance:
     thermometers   station: °C, standard uncertainty of its offset, doubts included
     profile        the same for the profile's parameter; 0: by the settings
     families       of `self_check`: standard deviation of the error that each bin's shots share, unit of the family
-    texts          reasons, a sentence each
+    reasons        of the allowances
     """
 
     held: frozenset[Parameter] = frozenset()
     thermometers: Mapping[str, float] = field(default_factory=dict)
     profile: float = 0.0
     families: Mapping[Family, float] = field(default_factory=dict)
-    texts: tuple[str, ...] = ()
+    reasons: tuple[AllowanceReason, ...] = ()
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """Reasons, a sentence each."""
+        return tuple(reason.text for reason in self.reasons)
 
     def same(self, allowance: "Allowance") -> bool:
         """True if no further adjustment is needed.
@@ -113,27 +130,26 @@ def refused(
     dropped   parameters whose priors the adjustment left out, and their estimates
     u         station: °C, of its offset by the ranges
     """
-    retained, texts = set(before.held), list(before.texts)
+    retained, reasons = set(before.held), list(before.reasons)
     zeros = [p for p in dropped if p.kind is ParameterKind.ZERO]
     if len(zeros) > max(1, MOST_ZEROS * rangers):
         retained |= set(zeros)
         names = ", ".join(p.of for p in zeros)
-        texts.append(
-            f"the misfit would need {len(zeros)} wrong zeros at once ({names}): the sheets are "
-            "kept, the cause is something else"
-        )
+        text = f"the misfit would need {len(zeros)} wrong zeros at once ({names}): the sheets are kept, the cause is "
+        reasons.append(AllowanceReason(text + "something else"))
     for parameter, value in dropped.items():
         if parameter.kind is not ParameterKind.THERMOMETER:
             continue
         prior = float(air.sigmas[air.stations.index(parameter.of)])
         if abs(value) > LARGEST_OFFSET_C or u[parameter.of] > prior:
             retained.add(parameter)
-            texts.append(
+            text = (
                 f"the misfit would need a bias of {parameter.of}'s thermometer by {value:+.1f} °C (u "
                 f"{u[parameter.of]:.1f} °C), which the ranges do not determine well enough: its record is kept, and "
                 "something else in the air departs from the model"
             )
-    return replace(before, held=frozenset(retained), texts=tuple(texts))
+            reasons.append(AllowanceReason(text))
+    return replace(before, held=frozenset(retained), reasons=tuple(reasons))
 
 
 def for_the_air(
@@ -153,26 +169,27 @@ def for_the_air(
     """
     values, variance = solution.x[columns], solution.q.diagonal()[columns]
     count = len(air.stations)
-    thermometers, texts, profile = dict(before.thermometers), list(before.texts), before.profile
+    thermometers, reasons, profile = dict(before.thermometers), list(before.reasons), before.profile
     slope = float(np.hypot(*air.across(values)))
     for i, station in enumerate(air.stations):
         if not air.placed[i]:
             u = float(np.hypot(air.sigmas[i], slope * UNPLACED))
             if u > 1.1 * max(air.sigmas[i], thermometers.get(station, 0.0)):
                 thermometers[station] = u
-        off = abs(float(values[i]))
+        off, thermometer = abs(float(values[i])), Parameter(ParameterKind.THERMOMETER, station)
         if (
             off > DOUBTED_C * air.sigmas[i]
             and station not in thermometers
-            and Parameter(ParameterKind.THERMOMETER, station) not in {*before.held, *dropped}
+            and thermometer not in {*before.held, *dropped}
         ):
             thermometers[station] = float(
                 np.hypot(air.sigmas[i], off)
             )  # almost refuted: its record no longer constrains it
-            texts.append(
+            text = (
                 f"{station}'s thermometer is biased by {values[i]:+.2f} °C by the ranges, {off / air.sigmas[i]:.1f} of "
                 "its record's u: the uncertainties include this"
             )
+            reasons.append(AllowanceReason(text, thermometer))
     gradient = air.steepest(values)
     if air.profile == BEND.part and not STEEPEST_DOWN <= gradient <= STEEPEST_UP:
         apart = abs(gradient - (0.0 if gradient > 0.0 else USUAL_GRADIENT)) * float(np.ptp(air.heights))
@@ -182,12 +199,12 @@ def for_the_air(
         profile = max(profile, float(np.hypot(air.sigmas[count], BEND_OF_GRADIENT * apart)))
         blamed = " or ".join(f"{s}'s thermometer" for s in unsure) or "a thermometer"
         kind = "a strong inversion" if gradient > 0.0 else "air that cools faster with height than is stable"
-        texts = [t for t in texts if not t.startswith("the stations differ")]
-        texts.append(
+        text = (
             f"the stations differ by {gradient:+.3f} °C a metre of height: {kind}, or {blamed} is off by some "
             f"{apart:.1f} °C, which no benchmark's path decides; the uncertainties include both"
         )
-    return replace(before, thermometers=thermometers, profile=profile, texts=tuple(texts))
+        reasons = [*(reason for reason in reasons if reason.subject != BEND), AllowanceReason(text, BEND)]
+    return replace(before, thermometers=thermometers, profile=profile, reasons=tuple(reasons))
 
 
 def for_families(before: Allowance, checks: list[FamilyCheck]) -> Allowance:
@@ -197,5 +214,7 @@ def for_families(before: Allowance, checks: list[FamilyCheck]) -> Allowance:
         return before
     worst = max(failed, key=lambda c: abs(c.worst.w))  # one at a time: a pattern shows in several families
     return replace(
-        before, families={**before.families, worst.family: worst.spread}, texts=(*before.texts, worst.text())
+        before,
+        families={**before.families, worst.family: worst.spread},
+        reasons=(*before.reasons, AllowanceReason(worst.text())),
     )

@@ -187,7 +187,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     air_estimates = {n: estimate(int(k)) for k, n in constant_parameters}
     sound = {line.name: air_estimates[line.name] for line in network.field.lines}
     air = {n: value for n, value in air_estimates.items() if n not in sound}
-    wrong = wrong_records(network, solution, air)
+    wrong, refuted = wrong_records(network, solution, air), refuted_priors(settled)
     leakage_at = {n: layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]
     return AdjustedCoordinates(
@@ -222,6 +222,6 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         unresolved=resolved.rejected,
         sound=sound,
         strength=network.strength,
-        doubts=doubts_of(network, solution, wrong),
-        refuted=tuple(refuted_priors(settled)),
+        doubts=doubts_of(network, solution, wrong, refuted),
+        refuted=tuple(refuted),
     )

@@ -22,9 +22,10 @@ from catseye.verdict import Verdict
 class Reduction:
     """Result of reducing a campaign.
 
-    status     of each shot, in the campaign's order
-    rejected   shot id: reason; reference shots included
-    notes      for the user, one line each
+    no_surface   reason that there is no surface; "" with one
+    status       of each shot, in the campaign's order
+    rejected     shot id: reason; reference shots included
+    notes        for the user, one line each
     """
 
     campaign: Campaign
@@ -33,6 +34,7 @@ class Reduction:
     electronics: dict[str, ElectronicsPhase]
     coordinates: AdjustedCoordinates
     surface: DishFit | None
+    no_surface: str
     status: tuple[ShotStatus, ...]
     rejected: dict[int, Reason]
     notes: tuple[str, ...]
@@ -95,6 +97,7 @@ def reduce_epoch(
         electronics=electronics,
         coordinates=coordinates,
         surface=surface,
+        no_surface=missing,
         status=status,
         rejected={int(campaign.shots.shot[k]): reasons[k] for k in sorted(reasons)},
         notes=tuple(notes),

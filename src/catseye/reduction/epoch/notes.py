@@ -1,6 +1,6 @@
 """Notes of an adjustment on records and shots, one line each."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from catseye.estimation.least_squares.adjustment import (
 from catseye.estimation.least_squares.robust import CHECKED
 from catseye.reduction.epoch.allowance import DOUBTED_C
 from catseye.reduction.epoch.cycles import MANY
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.range_shots import RangeShots
 from catseye.reduction.epoch.unknowns import (
     HEADS,
@@ -185,17 +186,23 @@ def record_notes(
     return notes
 
 
-def doubts_of(network: CampaignNetwork, solution: LeastSquaresSolution, wrong: list[str]) -> tuple[str, ...]:
+def doubts_of(
+    network: CampaignNetwork, solution: LeastSquaresSolution, wrong: list[str], refuted: Collection[Parameter]
+) -> tuple[str, ...]:
     """Reasons against a good verdict.
 
     Wrong records, allowances, thermometers at the end of their priors.
+
+    wrong     result of `wrong_records`
+    refuted   parameters whose priors were left out, which `wrong` names
     """
     doubts = [*wrong, *network.allowance.texts]
     air = network.field
     sigmas = network.allowance.sigmas(air)
+    named = {*refuted, *(reason.subject for reason in network.allowance.reasons)}
     for station, column, sigma in zip(air.stations, network.layout.air, sigmas, strict=False):
         value = float(solution.x[column])
-        if abs(value) > DOUBTED_C * sigma and not any(text.startswith(f"{station}'s") for text in doubts):
+        if abs(value) > DOUBTED_C * sigma and Parameter(ParameterKind.THERMOMETER, station) not in named:
             doubts.append(f"{station}'s thermometer is biased by {value:+.2f} °C, {abs(value) / sigma:.1f} of its u")
     return tuple(doubts)
 

@@ -13,8 +13,16 @@ import numpy as np
 
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.reduction.epoch.air.field import AirField
-from catseye.reduction.epoch.allowance import DOUBTED_C, STEEPEST_DOWN, STEEPEST_UP, UNSURE, USUAL_GRADIENT, Allowance
-from catseye.reduction.epoch.parameter import BEND, Parameter
+from catseye.reduction.epoch.allowance import (
+    DOUBTED_C,
+    STEEPEST_DOWN,
+    STEEPEST_UP,
+    UNSURE,
+    USUAL_GRADIENT,
+    Allowance,
+    AllowanceReason,
+)
+from catseye.reduction.epoch.parameter import BEND, Parameter, ParameterKind
 
 Judgement = Literal["biased", "apart"]
 
@@ -89,10 +97,14 @@ def with_suspected_biases(
     sigmas = dict(zip(air.stations, air.sigmas, strict=False))
     wide = {n: float(np.hypot(sigmas[n], bias.offset_c)) for n, bias in biases.items() if n not in {*opened, *refuted}}
     fixed = {p for p in air.parameters[: len(air.stations)] if p.of in wide}
-    texts = tuple(bias.text(n) for n, bias in biases.items() if bias.judgement == "biased" and n not in refuted)
-    named = tuple(f"{n}'s thermometer" for n in biases)
-    remaining = tuple(text for text in allowance.texts if not text.startswith(named))
-    return replace(allowance, held=allowance.held | fixed, thermometers=wide, texts=(*remaining, *texts))
+    suspected = {Parameter(ParameterKind.THERMOMETER, n): bias for n, bias in biases.items()}
+    remaining = (reason for reason in allowance.reasons if reason.subject not in suspected)
+    named = (
+        AllowanceReason(bias.text(p.of), p)
+        for p, bias in suspected.items()
+        if bias.judgement == "biased" and p.of not in refuted
+    )
+    return replace(allowance, held=allowance.held | fixed, thermometers=wide, reasons=(*remaining, *named))
 
 
 def prior_pulls(allowance: Allowance, air: AirField) -> dict[Parameter, float]:
