@@ -20,13 +20,13 @@ from pathlib import Path
 import numpy as np
 
 from catseye.constants import DEGREE
-from catseye.gateways.examples import example_campaign
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
 from catseye.geometry.mirror.pointing import MirrorStation, in_mirror_axes
 from catseye.geometry.mirror.track import apparent_motion, line_bound, longest_interval
 from catseye.geometry.sky.time_tag import TimeTag, tag_step
 from catseye.optics.spot import offset_range, offset_share, steering_range
+from catseye.records.files.examples import example_campaign
 from catseye.records.night.campaign import read_campaign
 from catseye.reduction.site.stations import station_of
 from catseye.reduction.steering.tracking import (

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.gateways import examples
-from catseye.gateways.examples import bundled_site, example_campaign, located
+from catseye.gateways.examples import copy_example
+from catseye.records.files import examples
+from catseye.records.files.examples import bundled_site, example_campaign, located
 from catseye.records.site.folder import read_site, site_files
 from catseye.reduction.site.places import places_of
 from repository import ROOT
@@ -75,13 +76,13 @@ def test_every_listed_example_is_there_and_can_be_copied(tmp_path):
     names = examples.example_names()
     assert {"night-01", "sites/gbt", "networks/ground-ring", "networks/feed-arm.toml"} <= set(names)
     assert all(examples.example(name).exists() for name in names)
-    count = len(examples.copy_example("", tmp_path / "mine"))
+    count = len(copy_example("", tmp_path / "mine"))
     assert count > 200
     assert (tmp_path / "mine/night-01/frames.npy").stat().st_size == (
         ROOT / "examples/night-01/frames.npy"
     ).stat().st_size
     with pytest.raises(InputError, match="exists and is not empty"):
-        examples.copy_example("", tmp_path / "mine")
+        copy_example("", tmp_path / "mine")
 
 
 def test_full_disk_is_reported_by_the_first_file_without_output(tmp_path):
@@ -91,7 +92,7 @@ def test_full_disk_is_reported_by_the_first_file_without_output(tmp_path):
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, before[1]))  # of the night only its samples are larger
         with pytest.raises(InputError, match=r"^[^\n]+/mine/frames\.npy: cannot be written: File too large$"):
-            examples.copy_example("night-01", tmp_path / "mine")
+            copy_example("night-01", tmp_path / "mine")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(tmp_path.iterdir())
@@ -99,7 +100,7 @@ def test_full_disk_is_reported_by_the_first_file_without_output(tmp_path):
 
 def test_examples_that_were_not_installed_are_refused_in_one_line(monkeypatch, tmp_path):
     package = tmp_path / "lib" / "catseye"
-    monkeypatch.setattr(examples, "__file__", str(package / "gateways" / "examples.py"))
+    monkeypatch.setattr(examples, "__file__", str(package / "records" / "files" / "examples.py"))
     with pytest.raises(InputError, match=r"^the examples are missing: neither [^\n]+ nor [^\n]+$"):
         bundled_site("gbt")
     (package / "examples" / "night-01").mkdir(parents=True)

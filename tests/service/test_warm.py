@@ -9,10 +9,10 @@ import pytest
 from catseye.constants import DEGREE
 from catseye.coordinator.visibility.vantage import reflector_at, vantages_of
 from catseye.errors import InputError
-from catseye.gateways.examples import located
 from catseye.geometry.mirror.pointing import beam
 from catseye.ranger.line import Request
 from catseye.ranger.sun_watch import HALF_ANGLE, PARKED, SET, nearest_sun, sun_departure_mjd, sun_of_site, way_out
+from catseye.records.files.examples import located
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import read_site
 from catseye.reduction.site.earth_rotation import place_of, sun_at

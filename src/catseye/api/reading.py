@@ -38,9 +38,11 @@ def examples(name: str | None = None, *, directory: "str | os.PathLike[str] | No
     >>> examples("networks/feed-arm.toml").name
     'feed-arm.toml'
     """
-    from catseye.gateways.examples import copy_example, example, example_names
+    from catseye.records.files.examples import example, example_names
 
     if directory is not None:
+        from catseye.gateways.examples import copy_example
+
         return copy_example(name or "", Path(directory))
     return example_names() if name is None else example(name)
 
@@ -50,7 +52,7 @@ def place_of(source: "str | os.PathLike[str]", *, output: bool = False) -> Path:
 
     output   what a command wrote is wanted, such as an epoch
     """
-    from catseye.gateways.examples import located
+    from catseye.records.files.examples import located
 
     return located(Path(source), output=output)
 

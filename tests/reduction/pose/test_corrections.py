@@ -20,7 +20,7 @@ def spread(size):
 def pose(k, **change):
     parts = {
         "file": f"pose-{k}.json",
-        "posture": (0.8 * k, 0.5 + 0.05 * k),
+        "posture_deg": (np.degrees(0.8 * k), np.degrees(0.5 + 0.05 * k)),
         "frame": "alidade",
         "rotation": RNG.normal(size=3) * 1e-6,
         "covariance": spread(6),
@@ -61,7 +61,7 @@ def test_poses_of_the_alidade_give_their_turns_about_x_and_y():
     assert found.sources == {each.file: each.verdict for each in poses}
 
 
-@pytest.mark.parametrize("part", ["posture", "correction", "correction_covariance"])
+@pytest.mark.parametrize("part", ["posture_deg", "correction", "correction_covariance"])
 def test_a_pose_without_beam_or_posture_is_refused(part):
     with pytest.raises(InputError, match=r"pose-1\.json: has no pointing or no posture"):
         PointingObservations.of_poses([pose(0), pose(1, **{part: None})])
@@ -71,7 +71,7 @@ def test_a_pose_without_beam_or_posture_is_refused(part):
     ("change", "said"),
     [
         ({"frame": "ground"}, "expected 'alidade'"),
-        ({"posture": None}, "with its posture"),
+        ({"posture_deg": None}, "with its posture"),
         ({"rotation": None}, "rotation or covariance is missing"),
         ({"covariance": None}, "rotation or covariance is missing"),
     ],
