@@ -71,7 +71,7 @@ def structure(  # noqa: PLR0913 - its options are its command line
             "--pivot", metavar="X,Y,Z", callback=_pivot, help="Pivot of turns, m, in the frame.  [default: middle]"
         ),
     ] = None,
-    harmonics: Annotated[int, typer.Option("--harmonics", min=1, max=2, help="Harmonics of elevation.")] = 1,
+    harmonics: Annotated[int, typer.Option("--harmonics", min=1, max=2, help="Number of harmonics of elevation.")] = 1,
     temperature: Annotated[
         bool, typer.Option("--temperature/--no-temperature", help="Coefficient of temperature.")
     ] = True,
