@@ -246,47 +246,6 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
     assert done.stderr.strip() == "[]"
 
 
-ONE_CALL = [
-    "acoustic",
-    "adjust",
-    "air",
-    "baseline",
-    "beam",
-    "calibrate",
-    "certificate",
-    "examples",
-    "explain",
-    "export",
-    "glass",
-    "journal backup",
-    "journal check",
-    "link",
-    "night",
-    "panels",
-    "plan",
-    "plot aberration",
-    "plot air",
-    "plot beam",
-    "plot coating",
-    "plot polarization",
-    "plot return",
-    "plot servo",
-    "plot sky",
-    "point",
-    "pointing fit",
-    "pointing predict",
-    "pointing track",
-    "pose",
-    "reduce",
-    "refractometer",
-    "replay",
-    "safety",
-    "simulate",
-    "sound",
-    "structure",
-    "surface",
-    "triplet",
-]
 VERBS = ("plot",)  # groups whose name is the verb
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
@@ -305,6 +264,10 @@ def callbacks():
     }
 
 
+WITHOUT_CALL = {"demo", "serve", "zy", "ziy"}  # the first is `reduce` and `save`; servers end with their process
+ONE_CALL = sorted(set(callbacks()) - WITHOUT_CALL)
+
+
 def python_name(words):
     """Function of catseye that is a command: `pointing fit` is `fit_pointing`, `plot sky` is `plot_sky`."""
     parts = words.split()
@@ -319,7 +282,7 @@ def signatures(words):
 
 def test_a_command_of_a_group_has_its_verb_first_in_python():
     assert (python_name("air"), python_name("pointing fit")) == ("air", "fit_pointing")
-    assert set(ONE_CALL) <= set(callbacks())
+    assert set(callbacks()) >= WITHOUT_CALL
 
 
 @pytest.mark.parametrize("words", ONE_CALL)
