@@ -65,7 +65,11 @@ def test_a_move_that_takes_for_ever_is_refused(catseye, tmp_path):
         (["aberration", "--beam-radius-mm", "0", "--out", "a.svg"], 1, "beam_radius"),
         (["polarization", "--glass", "butter", "--out", "a.svg"], 1, "butter"),
         (["beam", "nothing.toml", "--out", "a.svg"], 1, "nothing.toml"),
-        (["beam", ROOT / "examples/beams/head.toml", "--out", ROOT / "examples/beams/head.toml"], 1, "is an input"),
+        (
+            ["beam", ROOT / "examples/beams/head.toml", "--out", ROOT / "examples/beams/head.toml"],
+            1,
+            "unknown figure format",
+        ),
         ([*SKY, "--from=1,2", "--out", "a.svg"], 2, "go together"),
         ([*SKY, "--from=1", "--to=2,3", "--out", "a.svg"], 2, "is not AZIMUTH,ELEVATION in counts"),
         (["servo", "--counts", "0", "--out", "a.svg"], 2, "greater than or equal to 1"),
@@ -80,6 +84,15 @@ def test_what_cannot_be_drawn_says_so(catseye, tmp_path, monkeypatch, arguments,
     assert (done, said) == (status, "")
     assert complaint in " ".join(problem.replace("│", " ").split())
     assert not list(tmp_path.iterdir())
+
+
+def test_an_input_with_a_figures_name_is_not_overwritten(catseye, tmp_path):
+    train = tmp_path / "head.svg"
+    train.write_bytes(content := (ROOT / "examples/beams/head.toml").read_bytes())
+    status, said, complaint = catseye("plot", "beam", train, "--out", train)
+    assert (status, said) == (1, "")
+    assert "is an input of this figure" in complaint
+    assert train.read_bytes() == content
 
 
 def test_the_airs_figure_says_its_index_and_what_makes_it_uncertain(catseye, tmp_path):

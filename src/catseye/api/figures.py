@@ -88,6 +88,17 @@ class FigureResult(Result):
         return self.read
 
 
+def require_figure(path: "str | os.PathLike[str]") -> Path:
+    """Path of a figure, refused before the long work where `save_figure` would refuse its name.
+
+    Raises InputError for another suffix or a directory.
+    """
+    from catseye.gateways.writers.drawing import refuse_picture
+
+    refuse_picture(Path(path), "figure")
+    return Path(path)
+
+
 @with_units
 def plot_sky(
     monument: "str | os.PathLike[str]",

@@ -22,8 +22,21 @@ plots = typer.Typer(
 )
 app.add_typer(plots, name="plot")
 
+
+def _figure(path: Path) -> Path:
+    from catseye.api.figures import require_figure
+
+    return require_figure(path)
+
+
 Out = Annotated[
-    Path, typer.Option("--out", metavar="FIGURE", help="Figure to write, .svg, .pdf or .png: new, or an earlier one.")
+    Path,
+    typer.Option(
+        "--out",
+        metavar="FIGURE",
+        callback=_figure,
+        help="Figure to write, .svg, .pdf or .png: new, or an earlier one.",
+    ),
 ]
 U = {"callback": uncertainty}
 

@@ -94,6 +94,15 @@ def svg(figure: Figure) -> Svg:
     return text
 
 
+def refuse_picture(path: Path, option: str) -> None:
+    """Raise InputError for a name that `picture_file` cannot write."""
+    suffix = path.suffix.lower()
+    if path.is_dir():
+        raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
+    if suffix not in PICTURES:
+        raise InputError(f"{option} {path}: unknown figure format {suffix or 'nothing'!r} (expected {PICTURES_TEXT})")
+
+
 def picture_file(text: Svg, path: Path, option: str, *, mark: str) -> bytes:
     """Figure in the format of the file's suffix, marked as catseye's.
 
@@ -106,11 +115,8 @@ def picture_file(text: Svg, path: Path, option: str, *, mark: str) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
 
+    refuse_picture(path, option)
     suffix, stream = path.suffix.lower(), io.BytesIO()
-    if path.is_dir():
-        raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
-    if suffix not in PICTURES:
-        raise InputError(f"{option} {path}: unknown figure format {suffix or 'nothing'!r} (expected {PICTURES_TEXT})")
     if suffix == ".svg":
         return text.replace("<svg ", f"<!-- {mark} -->\n<svg ", 1).encode("utf-8")
     with styled():
