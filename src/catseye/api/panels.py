@@ -160,8 +160,9 @@ def panels(
 
     if not SHORTEST_M <= focal_length_m <= LONGEST_M:
         raise InputError(f"focal_length_m = {focal_length_m:g} (expected {SHORTEST_M:g} to {LONGEST_M:g} m)")
-    paths = (None if each is None else place_of(each) for each in (survey, cmm, as_left, survey_left))
-    files = PanelFiles(place_of(readings), place_of(instrument), *paths)
+    optional = {"survey": survey, "maps": cmm, "as_left": as_left, "survey_left": survey_left}
+    paths = {name: None if each is None else place_of(each) for name, each in optional.items()}
+    files = PanelFiles(readings=place_of(readings), sheet=place_of(instrument), **paths)
     work = panel_work(files, _layout(layout, focal_length_m), reject=reject, progress=progress)
     return PanelsResult(verdict=work.verdict, work=work, read=files.all)
 

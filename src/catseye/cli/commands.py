@@ -157,7 +157,9 @@ def reduce(
 
 @app.command(epilog="\b\nExample: catseye demo my-first-night")
 def demo(
-    directory: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where the report goes.")] = Path("demo-night-01"),
+    directory: Annotated[Path, typer.Argument(metavar="[DIR]", help="Directory of the report.")] = Path(
+        "demo-night-01"
+    ),
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -173,7 +175,8 @@ def demo(
 @app.command(epilog="\b\nExample: catseye examples my-examples")
 def examples(
     directory: Annotated[
-        Path | None, typer.Argument(metavar="[DIR]", help="Where to write them all: new or empty; listed without.")
+        Path | None,
+        typer.Argument(metavar="[DIR]", help="Directory to write them all to: new or empty; listed without."),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -24,7 +24,7 @@ def explain(  # noqa: PLR0913 - its options are its command line
     campaign: Annotated[
         Path, typer.Argument(metavar="CAMPAIGN", help="Directory of a campaign, laid out as examples/night-01.")
     ],
-    shot: Annotated[int, typer.Argument(metavar="SHOT", help="Its number in shots.csv.")],
+    shot: Annotated[int, typer.Argument(metavar="SHOT", help="Number of the shot in shots.csv.")],
     page: Annotated[
         Path | None, typer.Option("--page", metavar="FILE.html", help="Page to write: new, or an earlier one of these.")
     ] = None,

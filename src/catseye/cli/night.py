@@ -15,7 +15,7 @@ from catseye.cli.terminal import say
     "A small one: catseye night small --dish-prisms 60 --interval-s 14 --again 0"
 )
 def night(  # noqa: PLR0913 - its options are its command line
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Where the campaign goes: new or empty.")],
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the campaign: new or empty.")],
     seed: Annotated[int, typer.Option(help="Seed of every draw: the same night each time.")] = 2209,
     dish_prisms: Annotated[int, typer.Option(help="Prisms on the dish; the telescope has 2209.")] = 2209,
     azimuth_deg: Annotated[float, typer.Option(help="Azimuth of the telescope.")] = 145.3,

@@ -129,16 +129,16 @@ class ConditionWatch:
         problems = [*self._machine(), *self._measuring(), *_of_rangers(rangers, starting=self._starting)]
         problems.sort(key=lambda each: each.severity != "alarm")
         return SiteCondition(
-            self._word(problems),
-            tuple(problems),
-            rangers,
-            {name: link.troubles for name, link in self._links.items()},
-            self._epoch,
-            self._verdict,
-            "well" if self._clock_believed() else "in doubt",
-            "none" if self.disk is None else f"{self.disk.free / 1e9:.1f} GB free",
-            self._intake.trouble or "well",
-            self.holder,
+            word=self._word(problems),
+            problems=tuple(problems),
+            rangers=rangers,
+            troubles={name: link.troubles for name, link in self._links.items()},
+            epoch=self._epoch,
+            verdict=self._verdict,
+            clock="well" if self._clock_believed() else "in doubt",
+            disk="none" if self.disk is None else f"{self.disk.free / 1e9:.1f} GB free",
+            journal=self._intake.trouble or "well",
+            holder=self.holder,
         )
 
     # Inside ----------------------------------------------------------------------------------------------------------

@@ -57,7 +57,7 @@ class EventLog:
         self._logged.pop((kind, about), None)
         self._logged[kind, about] = _LoggedEvent(now_ticks)
         self._forget(now_ticks)
-        self._tell(Happening(now_ticks, self.who, kind, text, severity, details))
+        self._tell(Happening(ticks=now_ticks, who=self.who, kind=kind, text=text, severity=severity, details=details))
 
     def _forget(self, now_ticks: int) -> None:
         """Forget two of the oldest kinds outside the quiet time.
@@ -84,11 +84,29 @@ class EventLog:
         if text is not None:
             self._standing[kind] = text
             if previous is None:
-                self._tell(Happening(ticks_now(self._clock), self.who, kind, text, severity, details))
+                self._tell(
+                    Happening(
+                        ticks=ticks_now(self._clock),
+                        who=self.who,
+                        kind=kind,
+                        text=text,
+                        severity=severity,
+                        details=details,
+                    )
+                )
         elif previous is not None:
             del self._standing[kind]
             if over:
-                self._tell(Happening(ticks_now(self._clock), self.who, f"{kind}-over", over, "note", details))
+                self._tell(
+                    Happening(
+                        ticks=ticks_now(self._clock),
+                        who=self.who,
+                        kind=f"{kind}-over",
+                        text=over,
+                        severity="note",
+                        details=details,
+                    )
+                )
 
     @property
     def standings(self) -> tuple[str, ...]:

@@ -238,8 +238,26 @@ class Firing:
         now_ticks = ticks_now(self._clock)
         begin = now_ticks + round(STREAM_LEAD * TICKS_PER_SECOND)
         if target == REFERENCE or frame_of(self._site, ranger) == "reflector":
-            return PlannedShot(ranger, target, now_ticks, duration, np.zeros(3), np.zeros(3), True, "stream")
+            return PlannedShot(
+                ranger=ranger,
+                target=target,
+                begin_ticks=now_ticks,
+                duration=duration,
+                at_begin=np.zeros(3),
+                at_end=np.zeros(3),
+                fixed=True,
+                reason="stream",
+            )
         mjd = np.array([begin, begin + duration * TICKS_PER_SECOND]) / TICKS_PER_DAY
         first, last = self._live.place(target, mjd)
         fixed = bool(np.linalg.norm(last - first) < SLOWEST_TRACKED * duration)
-        return PlannedShot(ranger, target, now_ticks if fixed else begin, duration, first, last, fixed, "stream")
+        return PlannedShot(
+            ranger=ranger,
+            target=target,
+            begin_ticks=now_ticks if fixed else begin,
+            duration=duration,
+            at_begin=first,
+            at_end=last,
+            fixed=fixed,
+            reason="stream",
+        )

@@ -292,14 +292,16 @@ class Coordinator:
         if self.posture is None:
             return None
         return SiteState(
-            now_ticks,
-            self.posture,
-            self.firing.ready(now_ticks),
-            {name: link.counts for name, link in self.links.items() if link.counts is not None},
-            self.firing.resting(now_ticks),
-            {name: (now_ticks - ticks) / TICKS_PER_SECOND for name, ticks in self.firing.references.items()},
-            self._live.place,
-            self._live.uncertainty(),
+            now_ticks=now_ticks,
+            posture=self.posture,
+            ready=self.firing.ready(now_ticks),
+            counts={name: link.counts for name, link in self.links.items() if link.counts is not None},
+            suspended=self.firing.resting(now_ticks),
+            since_reference={
+                name: (now_ticks - ticks) / TICKS_PER_SECOND for name, ticks in self.firing.references.items()
+            },
+            place=self._live.place,
+            u=self._live.uncertainty(),
         )
 
     async def _solve(self, now_ticks: int) -> None:

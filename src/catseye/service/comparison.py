@@ -105,18 +105,18 @@ class TwinComparison:
         worst = int(np.argmax(length))
         offset, u_offset, true_offset = self._offsets(answer, dict(zip(names, body_places, strict=True)))
         return EpochComparison(
-            answer["number"],
-            int(answer["ticks"]),
-            len(chosen),
-            names[chosen[worst]],
-            float(length[worst]) / MILLIMETRE,
-            float(np.sqrt(np.mean(off**2))) / MILLIMETRE,
-            float(np.mean(np.sqrt(np.diag(covariance)))) / MILLIMETRE,
-            _chi2(off.ravel(), covariance) / off.size,
-            _band(off.size),
-            offset,
-            u_offset,
-            true_offset,
+            number=answer["number"],
+            ticks=int(answer["ticks"]),
+            points=len(chosen),
+            worst=names[chosen[worst]],
+            worst_mm=float(length[worst]) / MILLIMETRE,
+            rms_mm=float(np.sqrt(np.mean(off**2))) / MILLIMETRE,
+            mean_u_mm=float(np.mean(np.sqrt(np.diag(covariance)))) / MILLIMETRE,
+            chi2=_chi2(off.ravel(), covariance) / off.size,
+            band=_band(off.size),
+            offset=offset,
+            u_offset=u_offset,
+            true_offset=true_offset,
         )
 
     def _truth(self, names: list[str], times: Array, answer: Mapping[str, Any]) -> tuple[Array, Array]:

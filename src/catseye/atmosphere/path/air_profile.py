@@ -74,7 +74,15 @@ class WeatherReadings:
         means = [quantity.averaged(block) for quantity in quantities]
         first = means[0]
         values = [quantity.value for quantity in means]
-        return WeatherReadings(first.seconds, first.z, first.station, values[0], values[1], values[2], first.count)
+        return WeatherReadings(
+            seconds=first.seconds,
+            z=first.z,
+            station=first.station,
+            temperature_c=values[0],
+            pressure_hpa=values[1],
+            humidity_percent=values[2],
+            count=first.count,
+        )
 
 
 class PathIndex(NamedTuple):

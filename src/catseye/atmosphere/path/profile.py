@@ -188,7 +188,9 @@ class Profile:
             if not np.all(np.isfinite(getattr(readings, name))):
                 raise ValidityError(f"{name} of a reading is not finite; leave the reading out")
         mean = float(np.mean(readings.value))
-        empty = cls(readings, prior, ground, mean, np.zeros(n), np.zeros((0, 0)))
+        empty = cls(
+            readings=readings, prior=prior, ground=ground, mean=mean, weights=np.zeros(n), factor=np.zeros((0, 0))
+        )
         basis = empty.basis(readings.z)
         covariance = empty._smooth(readings.seconds, basis, readings.seconds, basis)
         same_station = readings.station[:, None] == readings.station
@@ -196,7 +198,7 @@ class Profile:
         covariance[np.diag_indices(n)] += prior.noise**2 / readings.count
         factor = cholesky(covariance, lower=True, overwrite_a=True)
         weights = _solved(factor, _solved(factor, readings.value - mean), transposed=True)
-        return cls(readings, prior, ground, mean, weights, factor)
+        return cls(readings=readings, prior=prior, ground=ground, mean=mean, weights=weights, factor=factor)
 
     def basis(self, z) -> np.ndarray:
         """Basis (..., 3) of the coefficients at heights z (...).

@@ -108,8 +108,14 @@ def limits(
 ) -> dict[str, ValidInterval]:
     """Limits of a model, each given as (least, greatest)."""
     return {
-        "temperature_c": ValidInterval("temperature", "C", *temperature_c, source),
-        "pressure_hpa": ValidInterval("pressure", "hPa", *pressure_hpa, source),
-        "humidity_percent": ValidInterval("relative humidity", "%", 0.0, 100.0, source),
-        "co2_ppm": ValidInterval("carbon dioxide", "ppm", *co2_ppm, source),
+        "temperature_c": _interval("temperature", "C", temperature_c, source),
+        "pressure_hpa": _interval("pressure", "hPa", pressure_hpa, source),
+        "humidity_percent": _interval("relative humidity", "%", (0.0, 100.0), source),
+        "co2_ppm": _interval("carbon dioxide", "ppm", co2_ppm, source),
     }
+
+
+def _interval(quantity: str, unit: str, span: tuple[float, float], source: str) -> ValidInterval:
+    """Interval of one quantity, its span as (least, greatest)."""
+    lower, upper = span
+    return ValidInterval(quantity=quantity, unit=unit, lower=lower, upper=upper, source=source)

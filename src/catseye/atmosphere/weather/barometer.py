@@ -327,7 +327,12 @@ def carried_pressure(
     ValidInterval("vapour's share of the pressure", "%", 0.0, 100.0, "a mixture of gases").check(100.0 * vapour / p)
     x = -lapse * rise / kelvin  # relative change of the absolute temperature
     ValidInterval(
-        "absolute temperature at the top over that below", "(ratio)", 0.5, 2.0, "the model of one linear layer", 1
+        quantity="absolute temperature at the top over that below",
+        unit="(ratio)",
+        lower=0.5,
+        upper=2.0,
+        source="the model of one linear layer",
+        places=1,
     ).check(1.0 + x)
     share, light = vapour / p, 1.0 - WATER_OVER_AIR
     weight = gravity * DRY_AIR_KG_PER_MOL / GAS_CONSTANT  # K/m, of dry air

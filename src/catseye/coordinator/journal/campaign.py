@@ -280,8 +280,17 @@ def _chosen(
         if reason := refusal(entry):
             omissions.add(reason, f"shot {shot.number} of {shot.ranger}")
             continue
-        fields = (shot.number, shot.ranger, shot.target, shot.cycles, shot.samples_per_cycle)
-        chosen.append(ExportedShot(shot.ticks, seq, *fields))
+        chosen.append(
+            ExportedShot(
+                ticks=shot.ticks,
+                seq=seq,
+                number=shot.number,
+                ranger=shot.ranger,
+                target=shot.target,
+                cycles=shot.cycles,
+                samples_per_cycle=shot.samples_per_cycle,
+            )
+        )
     chosen.sort(key=lambda shot: (shot.ticks, shot.seq))
     retained: list[ExportedShot] = []
     latest: dict[str, int] = {}

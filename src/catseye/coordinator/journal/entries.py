@@ -45,7 +45,14 @@ class AnsweredShot:
     @classmethod
     def of(cls, shot: LiveShot, answer: "ShotAnswer") -> "AnsweredShot":
         """The shot with an answer of `Live.shot`."""
-        return cls(shot, str(answer.status), answer.text, answer.range_, answer.u_range, answer.misfit)
+        return cls(
+            shot=shot,
+            status=str(answer.status),
+            text=answer.text,
+            range_=answer.range_,
+            u_range=answer.u_range,
+            misfit=answer.misfit,
+        )
 
 
 @dataclass(frozen=True)

@@ -161,19 +161,26 @@ def entry_of(table: str, row: StoredRow, samples: Samples | None = None) -> Entr
 
 def _read_shot(row: StoredRow, samples: Samples | None) -> AnsweredShot:
     shot = LiveShot(
-        row.ranger,
-        row.target,
-        row.ticks,
-        row.cycles,
-        row.samples_per_cycle,
-        row.if_hz,
-        _back(row.volts_per_code),
-        samples,
-        _back(row.amplitude_v),
-        _back(row.phase_rad),
-        row.number,
+        ranger=row.ranger,
+        target=row.target,
+        ticks=row.ticks,
+        cycles=row.cycles,
+        samples_per_cycle=row.samples_per_cycle,
+        if_hz=row.if_hz,
+        volts_per_code=_back(row.volts_per_code),
+        samples=samples,
+        amplitude=_back(row.amplitude_v),
+        phase=_back(row.phase_rad),
+        number=row.number,
     )
-    return AnsweredShot(shot, row.status, row.text, _back(row.range_m), _back(row.u_range_m), _back(row.misfit_m))
+    return AnsweredShot(
+        shot=shot,
+        status=row.status,
+        text=row.text,
+        range_=_back(row.range_m),
+        u_range=_back(row.u_range_m),
+        misfit=_back(row.misfit_m),
+    )
 
 
 def _read_solution(row: StoredRow, _: object) -> EpochSolution:
@@ -195,9 +202,16 @@ READERS: Mapping[str, Callable[[StoredRow, Samples | None], Entry]] = {
         _back(row.azimuth_rate_rad_s),
         _back(row.elevation_rate_rad_s),
     ),
-    "commands": lambda row, _: SentCommand(row.ticks, row.ranger, row.tid, row.line, row.reply, row.ok),
+    "commands": lambda row, _: SentCommand(
+        ticks=row.ticks, ranger=row.ranger, tid=row.tid, line=row.line, reply=row.reply, ok=row.ok
+    ),
     "happenings": lambda row, _: Happening(
-        row.ticks, row.who, row.kind, row.text, row.severity, json_object(row.details)
+        ticks=row.ticks,
+        who=row.who,
+        kind=row.kind,
+        text=row.text,
+        severity=row.severity,
+        details=json_object(row.details),
     ),
     "solutions": _read_solution,
     "documents": lambda row, _: Document(row.ticks, row.name, row.text),

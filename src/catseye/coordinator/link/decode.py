@@ -105,16 +105,16 @@ def shot_of(
     """
     sampling = usual if buffer is None else buffer.sampling
     return LiveShot(
-        ranger,
-        target,
-        measured.ticks,
-        sampling.cycles,
-        sampling.samples,
-        sampling.frequency_hz,
-        float("nan") if buffer is None else buffer.volts_per_code,
-        None if buffer is None else buffer.samples,
-        measured.amplitude,
-        measured.phase,
+        ranger=ranger,
+        target=target,
+        ticks=measured.ticks,
+        cycles=sampling.cycles,
+        samples_per_cycle=sampling.samples,
+        if_hz=sampling.frequency_hz,
+        volts_per_code=float("nan") if buffer is None else buffer.volts_per_code,
+        samples=None if buffer is None else buffer.samples,
+        amplitude=measured.amplitude,
+        phase=measured.phase,
     )
 
 

@@ -421,7 +421,9 @@ class RangerLink:
         text = "" if reply.command == "BUF" else reply.text[:LONGEST_REPLY_TEXT]  # samples have their own table
         came = reply.ticks is not None  # for a lost connection the client makes the answer
         ticks = reply.ticks if reply.ticks is not None else ticks_now(self._clock)
-        self._commanded(SentCommand(ticks, self.ranger, tid, line, text, reply.ok if came else None))
+        self._commanded(
+            SentCommand(ticks=ticks, ranger=self.ranger, tid=tid, line=line, reply=text, ok=reply.ok if came else None)
+        )
 
     async def _ask(self, request: Request, timeout: float) -> Reply:
         """Reply to a request; f = 0 if late or refused by the guard."""

@@ -91,7 +91,16 @@ def candidates(
     moving = trapezoid(middle[:, None], middle[None], around.vantage.pace).total
     corner = _round_corners(around, middle, low, high, code=code, moving=moving)
     chosen = np.concatenate([np.zeros((1, 3)), units[indices].reshape(-1, 3)])
-    return ShotCandidates(("", *(names[i] for i in indices)), middle, low, high, code, moving, corner, chosen), unseen
+    return ShotCandidates(
+        names=("", *(names[i] for i in indices)),
+        middle=middle,
+        low=low,
+        high=high,
+        code=code,
+        moving=moving,
+        corner=corner,
+        units=chosen,
+    ), unseen
 
 
 def _round_corners(

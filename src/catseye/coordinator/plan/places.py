@@ -95,15 +95,15 @@ class Places:
         points = np.einsum("cbn,cnk->cbk", lagrange(self.ticks, times), nodes)
         return tuple(
             PlannedShot(
-                vantage.name,
-                target.target,
-                int(begin[i]),
-                duration,
-                points[i, 0],
-                points[i, 1],
-                self._fixed(vantage, target.target, points[i]),
-                target.reason,
-                target.via,
+                ranger=vantage.name,
+                target=target.target,
+                begin_ticks=int(begin[i]),
+                duration=duration,
+                at_begin=points[i, 0],
+                at_end=points[i, 1],
+                fixed=self._fixed(vantage, target.target, points[i]),
+                reason=target.reason,
+                via=target.via,
             )
             for i, target in enumerate(chosen)
         )

@@ -214,7 +214,16 @@ class RoundPlanner:
             variance = variance + np.einsum("mi,ij,mj->m", table.units, covariance, table.units)
         share = 1.0 - s.dish_share if vantage.name in self.rasters and self.rasters[vantage.name].names else 1.0
         counted = np.array([n in self.retros and self.retros[n].part != "benchmark" for n in table.names])
-        return _Turn(vantage, around, table, points, variance, share * s.period, counted, counted.copy()), why
+        return _Turn(
+            vantage=vantage,
+            around=around,
+            table=table,
+            points=points,
+            variance=variance,
+            until=share * s.period,
+            counted=counted,
+            open_=counted.copy(),
+        ), why
 
     def _due(self, turn: _Turn, state: SiteState, begin: int) -> None:
         """Choose reference and benchmark, if due by the end of the round."""

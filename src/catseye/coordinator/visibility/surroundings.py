@@ -206,7 +206,13 @@ class KeepClear:
         boxes, pieces, guards = self._spheres(vantage, guard, frames, wider)
         up = self.counts_at(directions)
         return Surroundings(
-            vantage, turned if up else turned[:0], cone, boxes, pieces, guards, tuple(b.name for b in self.boxes)
+            vantage=vantage,
+            suns=turned if up else turned[:0],
+            sun_limit=cone,
+            boxes=boxes,
+            pieces=pieces,
+            guards=guards,
+            names=tuple(b.name for b in self.boxes),
         )
 
     def _spheres(self, vantage: Vantage, guard: Guard, frames: list[Transform], wider: float) -> Zones:

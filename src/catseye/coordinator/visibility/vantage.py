@@ -147,7 +147,13 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
         axis = None if target.normal is None else np.array(target.normal)
         point = np.array(target.position_mm) * MILLIMETRE
         retros[target.name] = SeenRetroreflector(
-            target.name, target.kind, target.frame, point, axis, _u(target.u_position_mm), part
+            name=target.name,
+            kind=target.kind,
+            frame=target.frame,
+            point=point,
+            axis=axis,
+            u=_u(target.u_position_mm),
+            part=part,
         )
     for triplet in site.triplets.values():
         ball, normal = np.array(triplet.nominal_position_mm) * MILLIMETRE, np.array(triplet.normal)
@@ -155,9 +161,13 @@ def retros_of(site: SiteFolder) -> dict[str, SeenRetroreflector]:
         half = 0.5 * triplet.d12_mm * MILLIMETRE * np.array(triplet.axis)
         u, frame = _u(triplet.u_position_mm), triplet.frame
         for side, point in ((triplet.left_prism, middle - half), (triplet.right_prism, middle + half)):
-            retros[side.target] = SeenRetroreflector(side.target, side.kind, frame, point, normal, u, "plate")
+            retros[side.target] = SeenRetroreflector(
+                name=side.target, kind=side.kind, frame=frame, point=point, axis=normal, u=u, part="plate"
+            )
         eye = triplet.ball
-        retros[eye.target] = SeenRetroreflector(eye.target, eye.kind, frame, ball, -normal, u, "underside")
+        retros[eye.target] = SeenRetroreflector(
+            name=eye.target, kind=eye.kind, frame=frame, point=ball, axis=-normal, u=u, part="underside"
+        )
     return retros
 
 

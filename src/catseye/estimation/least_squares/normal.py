@@ -109,7 +109,8 @@ class NormalEquations:
             return self._solved
         if self.sparse:
             order, place, *_ = self._order
-            return Sparse(self.size, place, self._scale[order], *self._factor)
+            lp, li, lx, d = self._factor
+            return Sparse(size=self.size, place=place, scale=self._scale[order], lp=lp, li=li, lx=lx, d=d)
         full = np.zeros((self.size, self.size))
         if len(self.moving):
             inverse = np.tril(lapack.dpotri(self._factor[0], lower=1)[0])

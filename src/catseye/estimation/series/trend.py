@@ -193,7 +193,15 @@ def trend_of(seconds: ArrayLike, values: ArrayLike, strength: TrendStrength, *, 
     right[at] = weight * (record.values - mean)
     factor = cholesky_banded(band, lower=True, check_finite=False)
     state = cho_solve_banded((factor, True), right, check_finite=False)
-    return Trend(times, state[0::2] + mean, state[1::2], strength, factor, float(first), float(last))
+    return Trend(
+        seconds=times,
+        level=state[0::2] + mean,
+        rate=state[1::2],
+        strength=strength,
+        factor=factor,
+        first=float(first),
+        last=float(last),
+    )
 
 
 def _precision(steps: np.ndarray, level: float, rate: float) -> tuple[np.ndarray, float]:

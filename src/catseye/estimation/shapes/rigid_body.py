@@ -300,7 +300,16 @@ def adjusted_motion(
     if step < smallest:
         status = _status(kind, spread_of, mirrored or np.linalg.det(matrix) < 0.0)
     free = x.size - columns.shape[1]
-    linear = LinearEstimate(change, spread_of, gain, weighted, float(misclosure @ weighted), free, columns, model)
+    linear = LinearEstimate(
+        estimate=change,
+        covariance=spread_of,
+        gain=gain,
+        weighted_residual=weighted,
+        pvv=float(misclosure @ weighted),
+        degrees_of_freedom=free,
+        design=columns,
+        model=model,
+    )
     motion = Transformation(
         kind=kind,
         pivot=pivot,

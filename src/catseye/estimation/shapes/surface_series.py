@@ -94,8 +94,17 @@ def fit_series(
     chosen = np.repeat([name in free for name in PARAMETERS], list(PARAMETERS.values()))
     columns = np.flatnonzero(chosen).astype(np.int64)
     local = np.ascontiguousarray((points - nominal.translation) @ nominal.rotation)
-    arrays = series(local, variance, weights, columns, float(focal_length), measure == "half-path")
-    return SurfaceSeries(free, *arrays)
+    parameters, covariance, deviation, measured, status = series(
+        local, variance, weights, columns, float(focal_length), measure == "half-path"
+    )
+    return SurfaceSeries(
+        free=free,
+        parameters=parameters,
+        covariance=covariance,
+        deviation=deviation,
+        points=measured,
+        status=status,
+    )
 
 
 def _plainly(

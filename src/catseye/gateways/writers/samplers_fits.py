@@ -311,7 +311,9 @@ def _read(page: Any) -> SamplerTable:
         else:
             columns[column.name] = SamplerColumn(column.unit or "", values, header.get(f"TCOMM{number}", ""))
     comment, frame, pivot = (str(header.get(key, "")) for key in ("REMARK", "FRAME", "PIVOT"))
-    return SamplerTable(page.name, columns, mjd, comment, frame, pivot, _more(header))
+    return SamplerTable(
+        name=page.name, columns=columns, mjd=mjd, comment=comment, frame=frame, pivot=pivot, header=_more(header)
+    )
 
 
 def _more(header: Any) -> dict[str, Any]:

@@ -184,17 +184,17 @@ class Outline:
         poles = poles[broadside] / sizes[broadside, None]
         distance, sphere = float(np.linalg.norm(at)), float(np.linalg.norm(half))
         return cls(
-            at,
-            half,
-            to_box,
-            box.length,
-            float(np.linalg.norm(np.maximum(np.abs(at) - half, 0.0))),
-            np.concatenate([a, b]),
-            poles,
-            np.cross(poles, a[broadside]),
-            np.cross(b[broadside], poles),
-            -at / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0]),
-            float(np.arcsin(sphere / distance)) if distance > sphere else np.pi,
+            at=at,
+            half=half,
+            to_box=to_box,
+            length=box.length,
+            near=float(np.linalg.norm(np.maximum(np.abs(at) - half, 0.0))),
+            corners=np.concatenate([a, b]),
+            poles=poles,
+            since=np.cross(poles, a[broadside]),
+            until=np.cross(b[broadside], poles),
+            middle=-at / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0]),
+            radius=float(np.arcsin(sphere / distance)) if distance > sphere else np.pi,
         )
 
     def clearance(self, direction: NDArray[np.float64], exact_below: float = np.inf) -> NDArray[np.float64]:

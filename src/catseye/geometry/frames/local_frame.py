@@ -7,7 +7,7 @@ directions"), or the plumb line on request. Heights: h above the ellipsoid, H el
 h = H + N. Metric state plane is EPSG:32151; EPSG:26854, the same zone, is in US survey feet and is refused by size.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -187,8 +187,7 @@ def with_zero_at(frame: LocalFrame, latitude: float, longitude: float, height: f
     """
     for _ in range(2):
         above = float(frame.from_geodetic(latitude, longitude, height)[2])
-        frame = LocalFrame(frame.latitude, frame.longitude, frame.height + above, frame.xi, frame.eta,
-                           frame.geoid_height, frame.plumb)  # fmt: skip
+        frame = replace(frame, height=frame.height + above)
     return frame
 
 

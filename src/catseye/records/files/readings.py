@@ -173,7 +173,16 @@ def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | Non
     if all(reasons):
         raise refusal(path.name, f"every reading has a reason in {LEFT_OUT!r} (expected some without)")
     hashes = {**folder.hashes, **page.hashes}
-    return SheetReadings(path.name, record, sheet_path.name, numbers, words, table.where(), reasons, hashes)
+    return SheetReadings(
+        file=path.name,
+        sheet=record,
+        sheet_file=sheet_path.name,
+        numbers=numbers,
+        words=words,
+        where=table.where(),
+        left_out=reasons,
+        hashes=hashes,
+    )
 
 
 def _within(table: TextColumns, name: str, bounds: Within) -> np.ndarray:

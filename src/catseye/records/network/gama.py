@@ -217,7 +217,13 @@ class _Reader:
             a, b, c = self._distance_stdev(section)
             claim = (a * MILLIMETRE, b * MILLIMETRE * 1e-3**c, c)  # of a length in km
         row = Row(
-            *(KINDS[child.tag], tuple(ends), turned * value, u, child.place, (instrument, *heights), parameters),
+            kind=KINDS[child.tag],
+            ends=tuple(ends),
+            value=turned * value,
+            u=u,
+            place=child.place,
+            heights=(instrument, *heights),
+            parameters=parameters,
             claim=claim,
             unit=written,
         )

@@ -147,17 +147,32 @@ def _axes(a: _Arrays) -> np.ndarray:
 MAKERS: dict[str, Callable[[str, np.ndarray, np.ndarray, _Arrays], Reported]] = {
     "slope_distance": lambda n, o, c, a: Distances(n, o, c, a.end(0), a.end(1), shift=a.shift(), **a.reading()),  # type: ignore[arg-type]
     "horizontal_distance": lambda n, o, c, a: HorizontalDistances(n, o, c, a.end(0), a.end(1), **a.reading()),  # type: ignore[arg-type]
-    "distance_difference": lambda n, o, c, a: DistanceDifferences(n, o, c, *map(a.end, range(4)), **a.reading()),  # type: ignore[arg-type]
+    "distance_difference": lambda n, o, c, a: DistanceDifferences(
+        name=n,
+        observed=o,
+        covariance=c,
+        origin=a.end(0),
+        target=a.end(1),
+        origin_2=a.end(2),
+        target_2=a.end(3),
+        **a.reading(),  # type: ignore[arg-type]
+    ),
     "fixed_distance": lambda n, o, c, a: FixedDistances(n, o, c, a.end(0), a.end(1)),
-    "direction": lambda n, o, c, a: Directions(n, o, c, a.end(0), a.end(1), _column(a, "orientation")),
-    "angle": lambda n, o, c, a: HorizontalAngles(n, o, c, a.end(0), a.end(1), a.end(2)),
+    "direction": lambda n, o, c, a: Directions(
+        name=n, observed=o, covariance=c, origin=a.end(0), target=a.end(1), orientation=_column(a, "orientation")
+    ),
+    "angle": lambda n, o, c, a: HorizontalAngles(
+        name=n, observed=o, covariance=c, at=a.end(0), backsight=a.end(1), foresight=a.end(2)
+    ),
     "azimuth": lambda n, o, c, a: Azimuths(n, o, c, a.end(0), a.end(1)),
     "zenith_angle": _zenith_angles,
     "height_difference": lambda n, o, c, a: HeightDifferences(n, o, c, a.end(0), a.end(1), shift=a.shift()),
     "inclination": lambda n, o, c, a: Inclinations(
         n, o, c, a.end(0), a.end(1), shift=a.shift(), zero=a.columns("zero")
     ),
-    "level_plane": lambda n, o, c, a: LevelPlanes(n, o, c, a.end(0), _column(a, "level"), a.constant("height", 0.0)),
+    "level_plane": lambda n, o, c, a: LevelPlanes(
+        name=n, observed=o, covariance=c, point=a.end(0), level=_column(a, "level"), height=a.constant("height", 0.0)
+    ),
     "coordinates": lambda n, o, c, a: ObservedCoordinates(n, o, c, a.end(0), _axes(a)),
     "vector": lambda n, o, c, a: Vectors(n, o, c, a.end(0)[::3], a.end(1)[::3]),
 }

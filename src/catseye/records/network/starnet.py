@@ -241,7 +241,19 @@ class _Reader:
         parameters = {"orientation": self.orientation} if kind == "direction" else {}
         shifted = heights if any(heights) else ()
         unit = "" if length else "gon" if self.settings.gons else "deg"
-        self.draft.observe(Row(kind, ends, value, u, line.place, shifted, parameters, claim=claim, unit=unit))
+        self.draft.observe(
+            Row(
+                kind=kind,
+                ends=ends,
+                value=value,
+                u=u,
+                place=line.place,
+                heights=shifted,
+                parameters=parameters,
+                claim=claim,
+                unit=unit,
+            )
+        )
 
     def _standard_error(self, line: StarnetLine, kind: str, *, error: str, value: float) -> float:
         length = kind in LENGTHS

@@ -266,7 +266,18 @@ class _Reader:
         shifted = heights if any(heights) else ()
         key = fields.keyed("value", units)
         unit = "gon" if key is not None and key[0].endswith("gon") else "deg" if units is ANGLE else ""
-        row = Row(kind, ends, value, u, fields.place, shifted, parameters, constants=constants, claim=claim, unit=unit)
+        row = Row(
+            kind=kind,
+            ends=ends,
+            value=value,
+            u=u,
+            place=fields.place,
+            heights=shifted,
+            parameters=parameters,
+            constants=constants,
+            claim=claim,
+            unit=unit,
+        )
         self.draft.observe(row)
 
     def _parameters(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> dict[str, int]:

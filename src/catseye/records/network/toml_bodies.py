@@ -66,7 +66,14 @@ class Bodies:
         self.draft.also(
             names,
             fields.place,
-            lambda at, first: RigidBodies(f"body {name}", observed, covariances, at, first + np.array(pose), start),
+            lambda at, first: RigidBodies(
+                name=f"body {name}",
+                observed=observed,
+                covariance=covariances,
+                point=at,
+                pose=first + np.array(pose),
+                start=start,
+            ),
         )
 
     def shape(self, fields: Fields) -> None:
@@ -115,13 +122,13 @@ class Bodies:
                 names,
                 fields.place,
                 lambda at, first: FramePoints(
-                    f"frame {name}",
-                    np.zeros(len(variances)),
-                    np.array(variances),
-                    at,
-                    first + np.array(pose),
-                    start,
-                    first + np.array(indices),
+                    name=f"frame {name}",
+                    observed=np.zeros(len(variances)),
+                    covariance=np.array(variances),
+                    point=at,
+                    pose=first + np.array(pose),
+                    start=start,
+                    frame_point=first + np.array(indices),
                 ),
             )
 
@@ -141,13 +148,13 @@ class Bodies:
             [],
             fields.place,
             lambda _, first: ObservedTilts(
-                f"tilt {frame}",
-                np.array([value]),
-                np.array([u**2]),
-                axis,
-                first + np.array(pose[3:]),
-                start,
-                np.array([first + self.named[zero]]) if zero else None,
+                name=f"tilt {frame}",
+                observed=np.array([value]),
+                covariance=np.array([u**2]),
+                axis=axis,
+                turn=first + np.array(pose[3:]),
+                start=start,
+                zero=np.array([first + self.named[zero]]) if zero else None,
             ),
         )
 
@@ -161,13 +168,13 @@ class Bodies:
             names,
             fields.place,
             lambda at, first: PointsOnPlane(
-                name,
-                np.full(m, value),
-                np.full(m, u**2),
-                at,
-                centre,
-                normal,
-                np.where(surface < 0, -1, first + surface),
+                name=name,
+                observed=np.full(m, value),
+                covariance=np.full(m, u**2),
+                point=at,
+                centre=centre,
+                normal=normal,
+                surface=np.where(surface < 0, -1, first + surface),
             ),
         )
 
@@ -184,7 +191,13 @@ class Bodies:
             names,
             fields.place,
             lambda at, first: PointsOnLine(
-                name, np.zeros(m), np.full(m, u**2), at, centre, along, np.where(line < 0, -1, first + line)
+                name=name,
+                observed=np.zeros(m),
+                covariance=np.full(m, u**2),
+                point=at,
+                centre=centre,
+                along=along,
+                line=np.where(line < 0, -1, first + line),
             ),
         )
 
@@ -201,13 +214,13 @@ class Bodies:
             [*names, centre],
             fields.place,
             lambda at, first: PointsOnSphere(
-                name,
-                np.full(m, value),
-                np.full(m, u**2),
-                at[:-1],
-                np.full(m, at[-1]),
-                radius,
-                np.full(m, first + column) if column >= 0 else None,
+                name=name,
+                observed=np.full(m, value),
+                covariance=np.full(m, u**2),
+                point=at[:-1],
+                centre=np.full(m, at[-1]),
+                radius=radius,
+                radius_column=np.full(m, first + column) if column >= 0 else None,
             ),
         )
 

@@ -363,11 +363,11 @@ def _travel_times(text: str, file: str, digest: str) -> TravelTimes:
             good = np.isnan(values[name]) | ((values[name] >= low) & (values[name] <= high))
             table.check(name, good, f"{low:g} to {high:g}")
     return TravelTimes(
-        file,
-        mjd,
-        values["time_ab_s"],
-        values.get("time_ba_s"),
-        values["u_time_us"] * 1e-6 if "u_time_us" in values else None,
-        {name: values[name] for name in BESIDES[1:] if name in values},
-        digest,
+        file=file,
+        mjd=mjd,
+        time_ab=values["time_ab_s"],
+        time_ba=values.get("time_ba_s"),
+        u_time=values["u_time_us"] * 1e-6 if "u_time_us" in values else None,
+        weather={name: values[name] for name in BESIDES[1:] if name in values},
+        digest=digest,
     )

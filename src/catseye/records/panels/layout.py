@@ -60,13 +60,13 @@ class PanelLayout:
         """Layout of some panels (indices, sorted), without corners that none of them has."""
         corners, quad = np.unique(self.quad[panels], return_inverse=True)
         return PanelLayout(
-            tuple(self.panels[p] for p in panels),
-            tuple(self.corners[c] for c in corners),
-            self.xy[corners],
-            quad.reshape(-1, 4),
-            self.offset[panels],
-            self.focal_length,
-            self.hashes,
+            panels=tuple(self.panels[p] for p in panels),
+            corners=tuple(self.corners[c] for c in corners),
+            xy=self.xy[corners],
+            quad=quad.reshape(-1, 4),
+            offset=self.offset[panels],
+            focal_length=self.focal_length,
+            hashes=self.hashes,
         )
 
     def rows(self) -> Iterable[tuple[str, int, str, float, float, float]]:
@@ -107,7 +107,15 @@ def read_layout(path: Path, focal_length: float) -> PanelLayout:
     quad = np.array([[number_of[four[k].corner] for k in (1, 2, 3, 4)] for four in panels.values()])
     offset = np.array([[four[k].design_offset_um * 1e-6 for k in (1, 2, 3, 4)] for four in panels.values()])
     xy = np.array(list(places.values())) * MILLIMETRE
-    layout = PanelLayout(tuple(panels), tuple(places), xy, quad, offset, focal_length, dict(folder.hashes))
+    layout = PanelLayout(
+        panels=tuple(panels),
+        corners=tuple(places),
+        xy=xy,
+        quad=quad,
+        offset=offset,
+        focal_length=focal_length,
+        hashes=dict(folder.hashes),
+    )
     _refuse_flat(layout, path.name)
     return layout
 
@@ -157,13 +165,13 @@ def layout_of_site(site: SiteFolder) -> PanelLayout:
             panels.append(f"T{tier:02d}{'N' if negative_x else 'P'}{count:02d}")
             quads.append([a[k + 1], b[k + 1], b[k], a[k]])
     layout = PanelLayout(
-        tuple(panels),
-        names,
-        xy,
-        np.array(quads, dtype=int),
-        np.zeros((len(quads), 4)),
-        site.site.paraboloid.focal_length_mm * MILLIMETRE,
-        {"targets.toml": site.hashes["targets.toml"], "site.toml": site.hashes["site.toml"]},
+        panels=tuple(panels),
+        corners=names,
+        xy=xy,
+        quad=np.array(quads, dtype=int),
+        offset=np.zeros((len(quads), 4)),
+        focal_length=site.site.paraboloid.focal_length_mm * MILLIMETRE,
+        hashes={"targets.toml": site.hashes["targets.toml"], "site.toml": site.hashes["site.toml"]},
     )
     unused = sorted(set(range(len(names))) - set(layout.quad.ravel().tolist()))
     if unused:

@@ -63,7 +63,14 @@ class KeepOutBox(Record):
     def box(self, length: float = np.inf) -> BoxZone:
         """Box in metres and radians, for a beam of a length, m."""
         centre, size = (np.array(v) * MILLIMETRE for v in self._centre_and_size_mm())
-        return BoxZone(centre, size, self.turn_deg * DEGREE, length, self.name, " ".join(self.why.split()))
+        return BoxZone(
+            centre=centre,
+            size=size,
+            turn=self.turn_deg * DEGREE,
+            length=length,
+            name=self.name,
+            why=" ".join(self.why.split()),
+        )
 
     def _centre_and_size_mm(self) -> tuple[list[float], list[float]]:
         if self.centre_mm is not None and self.size_mm is not None:

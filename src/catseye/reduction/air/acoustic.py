@@ -290,16 +290,25 @@ class _SpeedAlong:
         zero = np.zeros_like(forth)
         if back is None:
             speed = length / forth
-            return cls(length, speed, zero, speed, -speed / forth, zero, zero, both=False)
+            return cls(
+                length=length,
+                speed=speed,
+                wind=zero,
+                along=speed,
+                per_forth=-speed / forth,
+                per_back=zero,
+                u_prior=zero,
+                both=False,
+            )
         both = pair(forth, back, length)
         return cls(
-            length,
-            both.speed_along,
-            both.wind,
-            both.speed_along,
-            -0.5 * length / forth**2,
-            -0.5 * length / back**2,
-            zero,
+            length=length,
+            speed=both.speed_along,
+            wind=both.wind,
+            along=both.speed_along,
+            per_forth=-0.5 * length / forth**2,
+            per_back=-0.5 * length / back**2,
+            u_prior=zero,
         )
 
     def less_wind(self, given: PathWind) -> "_SpeedAlong":
@@ -346,7 +355,7 @@ class _StraightSpeed:
         shape = along.length.shape
         across, u_across = (np.broadcast_to(np.asarray(v, float), shape) for v in (wind.crosswind, wind.u_crosswind))
         speed, u_crosswind = straight_line_speed(along.speed * (1.0 - early), across, u_across)
-        return cls(along, speed, u_crosswind, bend_rms, early, spread)
+        return cls(along=along, speed=speed, u_crosswind=u_crosswind, bend_rms=bend_rms, early=early, spread=spread)
 
 
 def _check(line: SoundLine, station: StationAir, wind: PathWind, u_time: np.ndarray, *, one_way: bool) -> None:

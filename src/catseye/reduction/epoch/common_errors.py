@@ -140,7 +140,16 @@ class _Sight:
         line = np.linalg.pinv(np.stack([np.ones(len(heights)), heights - heights.mean()], axis=1))
         mean, gradient = (state[:, :, 0] @ row for row in line)
         pressure, humidity = state[:, :, 1:].mean(axis=1).T
-        return _Sight(part.name, a, b, 1.0 + part.refractivity, mean, gradient, pressure, humidity)
+        return _Sight(
+            name=part.name,
+            a=a,
+            b=b,
+            index=1.0 + part.refractivity,
+            temperature=mean,
+            gradient=gradient,
+            pressure=pressure,
+            humidity=humidity,
+        )
 
 
 def _of_heads(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sight]) -> Iterator[CommonError]:

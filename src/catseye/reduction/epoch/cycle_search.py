@@ -133,7 +133,13 @@ def _problem(scene: CycleScene, name: str, x: np.ndarray) -> _Problem:
     turn = np.concatenate([_by_direction(network, part) for _, part in pairs])
     half = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz
     return _Problem(
-        solution.x[columns], prior, stations, distance + misses, half / n, covariance, np.abs(turn) * u_place / distance
+        start=solution.x[columns],
+        prior=prior,
+        stations=stations,
+        lengths=distance + misses,
+        periods=half / n,
+        covariance=covariance,
+        u_glass=np.abs(turn) * u_place / distance,
     )
 
 

@@ -135,8 +135,16 @@ def disagreements(network: CampaignNetwork) -> list[str]:
     names, series = np.array(weather.station), []
     for station in network.campaign.site.weather_station:
         rows = names == station.name
-        readings = weather.mjd_utc[rows], weather.temperature_c[rows], weather.pressure_hpa[rows]
-        series.append(StationSeries(station.name, station.elevation_m, *readings, weather.humidity_percent[rows]))
+        series.append(
+            StationSeries(
+                name=station.name,
+                elevation_m=station.elevation_m,
+                mjd=weather.mjd_utc[rows],
+                temperature_c=weather.temperature_c[rows],
+                pressure_hpa=weather.pressure_hpa[rows],
+                humidity_percent=weather.humidity_percent[rows],
+            )
+        )
     conflicts = list(weather_disagreements([s for s in series if len(s.mjd)]))
     for mark in network.campaign.benchmarks:
         ends = [network.places[name] for name in (mark.ranger, mark.target) if name in network.places]

@@ -73,13 +73,13 @@ class Phases:
     def of(shots: Sequence["ShotPhase"]) -> "Phases":
         """Phases from single shots, as columns."""
         return Phases(
-            np.array([s.phasor for s in shots], dtype=complex),
-            np.array([s.u_phasor for s in shots]),
-            np.array([s.u_across for s in shots]),
-            np.array([s.offset for s in shots]),
-            np.array([s.harmonics for s in shots]).reshape(-1, 2),
-            np.array([s.largest for s in shots]),
-            tuple(s.reason for s in shots),
+            phasor=np.array([s.phasor for s in shots], dtype=complex),
+            u_phasor=np.array([s.u_phasor for s in shots]),
+            u_across=np.array([s.u_across for s in shots]),
+            offset=np.array([s.offset for s in shots]),
+            harmonics=np.array([s.harmonics for s in shots]).reshape(-1, 2),
+            largest=np.array([s.largest for s in shots]),
+            reason=tuple(s.reason for s in shots),
         )
 
     @property
@@ -254,29 +254,29 @@ class Detections:
         """Empty detections of n buffers."""
         one, three = np.zeros(n), np.zeros((n, 3))
         return Detections(
-            np.zeros(n, dtype=complex),
-            one,
-            one.copy(),
-            np.zeros((n, 2)),
-            one.copy(),
-            np.zeros(n, dtype=int),
-            three,
-            three.copy(),
-            [None] * n,
+            raw=np.zeros(n, dtype=complex),
+            u_phasor=one,
+            offset=one.copy(),
+            harmonics=np.zeros((n, 2)),
+            largest=one.copy(),
+            clipped=np.zeros(n, dtype=int),
+            total=three,
+            between=three.copy(),
+            wrong=[None] * n,
         )
 
     def row(self, k: int) -> BufferDetection:
         """Detection of one buffer, as plain numbers."""
         return BufferDetection(
-            complex(self.raw[k]),
-            float(self.u_phasor[k]),
-            float(self.offset[k]),
-            (float(self.harmonics[k, 0]), float(self.harmonics[k, 1])),
-            float(self.largest[k]),
-            int(self.clipped[k]),
-            self.total[k].tolist(),
-            self.between[k].tolist(),
-            self.wrong[k],
+            raw=complex(self.raw[k]),
+            u_phasor=float(self.u_phasor[k]),
+            offset=float(self.offset[k]),
+            harmonics=(float(self.harmonics[k, 0]), float(self.harmonics[k, 1])),
+            largest=float(self.largest[k]),
+            clipped=int(self.clipped[k]),
+            total=self.total[k].tolist(),
+            between=self.between[k].tolist(),
+            wrong=self.wrong[k],
         )
 
     def put(
@@ -341,7 +341,13 @@ def judged_phases(
         for k in range(n)
     ]
     return Phases(
-        phasor, detected.u_phasor, u_across, detected.offset, detected.harmonics, detected.largest, tuple(reason)
+        phasor=phasor,
+        u_phasor=detected.u_phasor,
+        u_across=u_across,
+        offset=detected.offset,
+        harmonics=detected.harmonics,
+        largest=detected.largest,
+        reason=tuple(reason),
     )
 
 

@@ -116,7 +116,9 @@ class _Sights:
             a, b = (np.einsum("mij,mj->mi", r, p) + s for p, r, s in ((a, *turns[:2]), (b, *turns[2:])))
         towards = a - b
         distance = np.linalg.norm(towards, axis=1)
-        return _Sights(origin, target, a, b, distance, towards / distance[:, None], turns)
+        return _Sights(
+            origin=origin, target=target, a=a, b=b, distance=distance, towards=towards / distance[:, None], turns=turns
+        )
 
     @property
     def ranger_seen(self) -> np.ndarray:
@@ -203,9 +205,32 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     covariance += jitter if covariance.ndim == 1 else np.diag(jitter)
     origin, target = sights.origin, sights.target
     if sights.turns is None:
-        return Distances(name, observed, covariance, origin, target, n, offset, nuisance, coefficient), parts
+        return Distances(
+            name=name,
+            observed=observed,
+            covariance=covariance,
+            origin=origin,
+            target=target,
+            scale=n,
+            offset=offset,
+            nuisance=nuisance,
+            coefficient=coefficient,
+        ), parts
+    origin_turn, origin_shift, target_turn, target_shift = sights.turns
     moving = MovingDistances(
-        name, observed, covariance, origin, target, *sights.turns, n, offset, nuisance=nuisance, coefficient=coefficient
+        name=name,
+        observed=observed,
+        covariance=covariance,
+        origin=origin,
+        target=target,
+        origin_turn=origin_turn,
+        origin_shift=origin_shift,
+        target_turn=target_turn,
+        target_shift=target_shift,
+        scale=n,
+        offset=offset,
+        nuisance=nuisance,
+        coefficient=coefficient,
     )
     return moving, parts
 

@@ -275,20 +275,20 @@ def build_network(
         columns = [layout.at[line] for line in lines]
         priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
     network = CampaignNetwork(
-        campaign,
-        settings,
-        phases,
-        electronics,
-        involved,
-        layout,
-        air,
-        priors,
-        motion,
-        {},
-        processes,
-        strength,
-        allowance,
-        tuple(sorts),
+        campaign=campaign,
+        settings=settings,
+        phases=phases,
+        electronics=electronics,
+        places=involved,
+        layout=layout,
+        field=air,
+        priors=priors,
+        motion=motion,
+        states={},
+        processes=processes,
+        strength=strength,
+        allowance=allowance,
+        sortings=tuple(sorts),
     )
     if any(e.walk is not None for e in electronics.values()):
         network.priors[:] = [_apart(prior) for prior in priors]
@@ -593,15 +593,15 @@ def _positive(u: float, where: str) -> float:
 def _length(name: str, length: float, u: float, layout: UnknownsLayout, origin: str, target: str) -> Distances:
     one = np.ones(1)
     return Distances(
-        name,
-        length * one,
-        u**2 * np.eye(1),
-        layout.columns(origin, 1),
-        layout.columns(target, 1),
-        one,
-        0.0 * one,
-        np.zeros((1, 0), dtype=int),
-        np.zeros((1, 0)),
+        name=name,
+        observed=length * one,
+        covariance=u**2 * np.eye(1),
+        origin=layout.columns(origin, 1),
+        target=layout.columns(target, 1),
+        scale=one,
+        offset=0.0 * one,
+        nuisance=np.zeros((1, 0), dtype=int),
+        coefficient=np.zeros((1, 0)),
     )
 
 

@@ -102,13 +102,13 @@ def observed_site(
             np.array([w.humidity_percent for w in readings]),
         ),
         shots=ShotColumns(
-            np.array([r.shot.number for r in rows], dtype=np.int64),
-            np.array([r.mjd for r in rows]),
-            tuple(r.shot.ranger for r in rows),
-            tuple(r.shot.target for r in rows),
-            np.array([r.shot.cycles for r in rows], dtype=np.int64),
-            np.array([r.shot.samples_per_cycle for r in rows], dtype=np.int64),
-            np.arange(len(rows)),
+            shot=np.array([r.shot.number for r in rows], dtype=np.int64),
+            mjd_utc=np.array([r.mjd for r in rows]),
+            ranger=tuple(r.shot.ranger for r in rows),
+            target=tuple(r.shot.target for r in rows),
+            cycles=np.array([r.shot.cycles for r in rows], dtype=np.int64),
+            samples_per_cycle=np.array([r.shot.samples_per_cycle for r in rows], dtype=np.int64),
+            frame=np.arange(len(rows)),
         ),
     )
 
@@ -187,13 +187,13 @@ def solve_epoch(
         elevation=float(motion.track.at(motion.epoch)[1]),
     )
     return Epoch(
-        tuple(rows),
-        coordinates,
-        estimate if state is None else update_correlated(state, estimate),
-        reasons,
-        biases,
-        refuted,
-        prior_pulls(network.allowance, network.field),
+        rows=tuple(rows),
+        coordinates=coordinates,
+        state=estimate if state is None else update_correlated(state, estimate),
+        reasons=reasons,
+        biases=biases,
+        opened=refuted,
+        pulls=prior_pulls(network.allowance, network.field),
     )
 
 

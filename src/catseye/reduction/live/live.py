@@ -334,25 +334,31 @@ class Live:
         times = [r.mjd for r in rows if r.shot.target != REFERENCE]
         track = self.track.between(min([mjd, *times]), max([mjd, *times]))
         motion = TelescopeCarrier(
-            self.site, track, self.frames, mjd, self.bodies, self._shaking(rows), self.settings.lasting_path
+            site=self.site,
+            track=track,
+            frames=self.frames,
+            epoch=mjd,
+            bodies=self.bodies,
+            jitter_mm=self._shaking(rows),
+            lasting=self.settings.lasting_path,
         )
         names = {name for r in rows for name in (r.shot.ranger, r.shot.target)} & self._local.keys()
         places = {name: self._local[name] for name in sorted(names)}
         self._apply_suspicions(self.stations.moved(), trusted=frozenset(read.station for read in weather))
         state = self._predicted_state(ticks, elevation)
         return EpochJob(
-            rows,
-            weather,
-            motion,
-            places,
-            self._index,
-            azimuth,
-            elevation,
-            state,
-            self.lasting,
-            ticks,
-            self.settings.reduction,
-            self._opened,
+            rows=rows,
+            weather=weather,
+            motion=motion,
+            places=places,
+            index=self._index,
+            azimuth=azimuth,
+            elevation=elevation,
+            state=state,
+            tracked=self.lasting,
+            ticks=ticks,
+            rules=self.settings.reduction,
+            opened=self._opened,
         )
 
     def accept(self, job: "EpochJob", epoch: "Epoch | str") -> EpochAnswer | None:
@@ -403,27 +409,27 @@ class Live:
                 why[int(ranges.shot[row])] = Reason(ShotStatus.REFLECTED, text)
         rejected = {n: reason for k, reason in why.items() for n in rows[k].numbers}
         return EpochAnswer(
-            self.number,
-            self.last_ticks,
-            azimuth,
-            elevation,
-            coordinates.points,
-            coordinates.x,
-            coordinates.covariance,
-            tuple(int(n) for n in coordinates.shots),
-            tuple(sorted(set(used))),
-            dict(sorted(rejected.items())),
-            coordinates.variance_factor,
-            coordinates.degrees_of_freedom,
-            coordinates.refractivity_ppm,
-            coordinates.air,
-            coordinates.zeros,
-            pose,
-            (*coordinates.notes, *self.stations.notes()),
-            motion.jitter_mm,
-            coordinates.doubts,
-            epoch.biases,
-            self._returned(),
+            number=self.number,
+            ticks=self.last_ticks,
+            azimuth=azimuth,
+            elevation=elevation,
+            names=coordinates.points,
+            x=coordinates.x,
+            covariance=coordinates.covariance,
+            shots=tuple(int(n) for n in coordinates.shots),
+            used=tuple(sorted(set(used))),
+            rejected=dict(sorted(rejected.items())),
+            variance_factor=coordinates.variance_factor,
+            degrees_of_freedom=coordinates.degrees_of_freedom,
+            refractivity_ppm=coordinates.refractivity_ppm,
+            air=coordinates.air,
+            zeros=coordinates.zeros,
+            pose=pose,
+            notes=(*coordinates.notes, *self.stations.notes()),
+            jitter_mm=motion.jitter_mm,
+            doubts=coordinates.doubts,
+            biases=epoch.biases,
+            returned=self._returned(),
         )
 
     def _suspect(self, epoch: Epoch) -> None:

@@ -188,15 +188,15 @@ def _rigid(body: str, places: Array, change: Array, covariance: Array, pivot: Ar
     six = to_motion @ change
     spread = to_motion @ covariance @ to_motion.T + bending * to_motion @ to_motion.T
     motion = BodyMotion(
-        body,
-        pivot,
-        six[:3],
-        six[3:],
-        _positive(spread),
-        chi2 if scale >= 1e-16 else 0.0,
-        degrees,
-        len(places),
-        float(np.sqrt(bending)),
+        body=body,
+        pivot=pivot,
+        translation=six[:3],
+        rotation=six[3:],
+        covariance=_positive(spread),
+        chi2=chi2 if scale >= 1e-16 else 0.0,
+        degrees_of_freedom=degrees,
+        points=len(places),
+        bending=float(np.sqrt(bending)),
     )
     return motion, to_motion, bending
 

@@ -130,7 +130,13 @@ def phased(
     elif shot.cycles >= FEWEST_FOR_BATCHES:  # fewer do not determine one quadrature's scatter
         across = math.sqrt(variance_across(buffer.total, buffer.between, shot.cycles, phasor=phasor))
     phase = ShotPhase(
-        phasor, buffer.u_phasor, across, buffer.offset, buffer.harmonics, buffer.largest, buffer.wrong or reason
+        phasor=phasor,
+        u_phasor=buffer.u_phasor,
+        u_across=across,
+        offset=buffer.offset,
+        harmonics=buffer.harmonics,
+        largest=buffer.largest,
+        reason=buffer.wrong or reason,
     )
     return PhasedShot(shot, shot.middle_mjd, phase)
 
@@ -166,12 +172,12 @@ def _detected(shot: LiveShot, samples: NDArray[np.int16], bits: int, run: float,
         wrong = _plainly(samples, n, volts, bits).wrong
     mean, moments = (out[0:2], out[kernel.TOTAL :]) if run == 0.0 else (stand[0:2], stand[2:])
     return BufferDetection(
-        complex(mean[0], mean[1]) * volts + (leaked if run else 0.0),
-        math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts,
-        out[kernel.OFFSET] * volts,
-        (out[kernel.SECOND] * volts, out[kernel.SECOND + 1] * volts),
-        max(-out[kernel.LOW], out[kernel.HIGH]) * volts,
-        int(out[kernel.CLIPPED]),
+        raw=complex(mean[0], mean[1]) * volts + (leaked if run else 0.0),
+        u_phasor=math.sqrt((moments[0] + moments[1]) / (2.0 * (m - 1) * m)) * volts,
+        offset=out[kernel.OFFSET] * volts,
+        harmonics=(out[kernel.SECOND] * volts, out[kernel.SECOND + 1] * volts),
+        largest=max(-out[kernel.LOW], out[kernel.HIGH]) * volts,
+        clipped=int(out[kernel.CLIPPED]),
         total=[v * volts**2 for v in moments[:3]],
         between=[v * volts**2 for v in moments[3:6]],
         wrong=wrong,
@@ -214,7 +220,15 @@ def answer(
         if abs(amplitude / level - 1.0) > REFERENCE_CHANGE:
             text = f"return {amplitude:.3f} V, expected {level:.3f} V from the cube"
             return ShotAnswer.refused(Reason(ShotStatus.BAD_REFERENCE, text), amplitude, phase)
-        return ShotAnswer(ShotStatus.REFERENCE, None, amplitude, phase, d0, 0.0, 0.0)
+        return ShotAnswer(
+            status=ShotStatus.REFERENCE,
+            reason=None,
+            amplitude=amplitude,
+            phase=phase,
+            range_=d0,
+            u_range=0.0,
+            misfit=0.0,
+        )
     if not history.references:
         text = "no good shot on the ranger's internal cube yet"
         return ShotAnswer.refused(Reason(ShotStatus.NO_REFERENCE, text), amplitude, phase)
@@ -230,4 +244,12 @@ def answer(
     u_phase = math.hypot(row.phase.u_across / amplitude, last.phase.u_across / max(abs(last.phase.phasor), 1e-9))
     drift = walk * math.sqrt(abs(row.mjd - last.mjd) * SECONDS_PER_DAY)
     u = half / TWO_PI / corrections.index * math.hypot(u_phase, drift)
-    return ShotAnswer(ShotStatus.USED, None, amplitude, phase, range_, u, range_ - distance)
+    return ShotAnswer(
+        status=ShotStatus.USED,
+        reason=None,
+        amplitude=amplitude,
+        phase=phase,
+        range_=range_,
+        u_range=u,
+        misfit=range_ - distance,
+    )

@@ -89,7 +89,13 @@ def solved_points(reduction: Reduction) -> SolvedPoints:
     angles = (float(np.radians(posture.azimuth_deg)), float(np.radians(posture.elevation_deg)))
     names = tuple(coordinates.points)
     return SolvedPoints(
-        posture.name, posture.name, names, coordinates.x, coordinates.joint, angles, reduction.campaign.hashes
+        file=posture.name,
+        campaign=posture.name,
+        names=names,
+        x=coordinates.x,
+        covariance=coordinates.joint,
+        posture=angles,
+        hashes=reduction.campaign.hashes,
     )
 
 
@@ -98,4 +104,12 @@ def _estimate(
 ) -> DishEstimate:
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     u_axis = np.sqrt(np.einsum("ai,ij,aj->a", lean, covariance[3:6, 3:6], lean))
-    return DishEstimate(command, fitted, translation, rotation, u, lean @ rotation, u_axis)
+    return DishEstimate(
+        command=command,
+        fitted=fitted,
+        translation=translation,
+        rotation=rotation,
+        u=u,
+        axis=lean @ rotation,
+        u_axis=u_axis,
+    )

@@ -171,7 +171,16 @@ def pose_of_group(
     against = "design" if earlier is None else earlier.campaign or earlier.file
     places = first[used] if to_frame.to == to_frame.from_ else to_frame.points(first[used])
     off = _posture_offset(group, pose, carrier_from_ground, later, earlier) if carrier == "reflector" else None
-    return GroupPose(group or "points", result, against, places, missing, later, earlier, off)
+    return GroupPose(
+        group=group or "points",
+        pose=result,
+        against=against,
+        places=places,
+        missing=missing,
+        epoch=later,
+        earlier=earlier,
+        posture=off,
+    )
 
 
 def _posture_offset(

@@ -69,7 +69,17 @@ def compare_series(first: PointingSeries, second: PointingSeries) -> SeriesCompa
     covariances = first.covariance_of_correction(a, e) + second.covariance_of_correction(a, e)
     u = np.sqrt(np.maximum(np.diagonal(covariances, axis1=-2, axis2=-1), 0.0))
     delta = second.correction(a, e) - first.correction(a, e)
-    return SeriesComparison(terms, difference, spread, chi2, p, a, e, delta, u)
+    return SeriesComparison(
+        terms=terms,
+        difference=difference,
+        covariance=spread,
+        chi2=chi2,
+        p=p,
+        azimuth=a,
+        elevation=e,
+        on_the_sky=delta,
+        u_on_the_sky=u,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,12 +113,14 @@ def distance_disagreement(
     if not abs(difference) > SURE * u:
         return None
     reason = _factor(typed / length if length > 0.0 else np.inf)
+    first, second = names
     return Disagreement(
-        "typed distance and coordinates",
-        *names,
-        difference / MILLIMETRE,
-        u / MILLIMETRE,
-        "mm",
+        what="typed distance and coordinates",
+        first=first,
+        second=second,
+        difference=difference / MILLIMETRE,
+        u=u / MILLIMETRE,
+        unit="mm",
         accused="",
         reason=reason,
     )
@@ -171,9 +173,27 @@ def _barometers(first: StationSeries, second: StationSeries) -> Disagreement | N
             f"{impossible[0]}'s is wrong, or its elevation: reduced to sea level it is "
             f"{reduced[impossible[0]]:.0f} hPa, outside the observed {SEA_LEVEL_HPA[0]:.0f} to {SEA_LEVEL_HPA[1]:.0f}"
         )
-        return Disagreement("barometers", first.name, second.name, difference, u, "hPa", impossible[0], reason)
+        return Disagreement(
+            what="barometers",
+            first=first.name,
+            second=second.name,
+            difference=difference,
+            u=u,
+            unit="hPa",
+            accused=impossible[0],
+            reason=reason,
+        )
     reason = "their heights and standard air do not decide which is wrong"
-    return Disagreement("barometers", first.name, second.name, difference, u, "hPa", "", reason)
+    return Disagreement(
+        what="barometers",
+        first=first.name,
+        second=second.name,
+        difference=difference,
+        u=u,
+        unit="hPa",
+        accused="",
+        reason=reason,
+    )
 
 
 def _at_sea_level(station: StationSeries) -> float:
@@ -202,4 +222,13 @@ def _hygrometers(first: StationSeries, second: StationSeries) -> Disagreement | 
     if not abs(difference) > SURE * u:
         return None
     reason = "in the same air both cannot be right; undecided which is wrong"
-    return Disagreement("hygrometers", first.name, second.name, difference, u, "%", "", reason)
+    return Disagreement(
+        what="hygrometers",
+        first=first.name,
+        second=second.name,
+        difference=difference,
+        u=u,
+        unit="%",
+        accused="",
+        reason=reason,
+    )

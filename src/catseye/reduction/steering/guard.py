@@ -422,16 +422,16 @@ def guard_of(
     # The beam turns by twice the face's angle.
     tilt = 2.0 * abs(mirror.face_tilt_rad) + float(np.hypot(mirror.beam_tilt_x_rad, mirror.beam_tilt_y_rad))
     return Guard(
-        name,
-        station,
-        pace,
-        (mirror.az_low_limit, mirror.az_high_limit),
-        place,
-        keep_out.boxes(),
-        keep_out.sun.half_angle_deg * DEGREE,
-        keep_out.margin_counts,
-        keep_out.sun.horizon_deg * DEGREE,
-        servo_margin(encoder) + tilt,
+        name=name,
+        station=station,
+        pace=pace,
+        azimuth_limits=(mirror.az_low_limit, mirror.az_high_limit),
+        place=place,
+        boxes=keep_out.boxes(),
+        half_angle=keep_out.sun.half_angle_deg * DEGREE,
+        margin_counts=keep_out.margin_counts,
+        horizon=keep_out.sun.horizon_deg * DEGREE,
+        off_beam=servo_margin(encoder) + tilt,
     )
 
 

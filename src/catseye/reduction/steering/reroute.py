@@ -176,7 +176,14 @@ class _Grid:
         nodes = np.stack(np.meshgrid(azimuth, elevation, indexing="ij"), axis=-1)
         gap = guard.clearance(mjd, nodes, exact_below=4.0 * float(np.sum(np.array(step) * BEAM_PER_COUNT)))
         gap[..., 0] -= slack
-        return cls(guard, mjd, slack, nodes.reshape(-1, 2), nodes.shape[:2], np.min(gap, axis=-1).ravel() - TOUCH)
+        return cls(
+            guard=guard,
+            mjd=mjd,
+            slack=slack,
+            nodes=nodes.reshape(-1, 2),
+            sides=nodes.shape[:2],
+            room=np.min(gap, axis=-1).ravel() - TOUCH,
+        )
 
     def ways(self, start: NDArray, goals: NDArray) -> list[tuple[NDArray[np.float64], int]]:
         """Fastest path (n, 2) to each reachable goal, with its number.

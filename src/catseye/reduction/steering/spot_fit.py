@@ -151,15 +151,15 @@ def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
         return Spot(f"not found: the spot's centre {edge[0]:.1f}, {edge[1]:.1f} lies outside the scan")
     centre, slope = _in_counts(middle, head, p[:2])
     return Spot(
-        FOUND,
-        centre,
-        slope @ q[:2, :2] @ slope.T,
-        float(peak),
-        float(np.exp(p[2]) * head.radius),
-        float(background),
-        float(1.0 + p[5] ** 2),
-        factor,
-        len(a),
+        status=FOUND,
+        counts=centre,
+        covariance=slope @ q[:2, :2] @ slope.T,
+        amplitude=float(peak),
+        radius=float(np.exp(p[2]) * head.radius),
+        background=float(background),
+        flatness=float(1.0 + p[5] ** 2),
+        variance_factor=factor,
+        readings=len(a),
     )
 
 

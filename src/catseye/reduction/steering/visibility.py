@@ -175,7 +175,18 @@ def visibility(
         (Sight.TOO_NEAR, distance < limits.near),
     ):
         code[failing] = reason
-    return Visibility(tuple(rangers), targets.names, code, distance, angle, limit, which, at, names, limits)
+    return Visibility(
+        rangers=tuple(rangers),
+        targets=targets.names,
+        code=code,
+        range=distance,
+        incidence=angle,
+        limit=limit,
+        obstacle=which,
+        obstacle_at=at,
+        solids=names,
+        limits=limits,
+    )
 
 
 def frames_at(azimuth: float, elevation: float, reflector: Transform | None = None) -> dict[str, Transform]:

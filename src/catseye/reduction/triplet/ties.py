@@ -73,15 +73,15 @@ def triplet_observations(units: Sequence[MountedTriplet], at: TripletParameters)
     no_columns = np.full(n, -1)
     u = [(U_FIXED, U_FIXED, t.u_h_corr, t.u_d_12, t.u_square) for t in units]
     bodies = RigidTriplets(
-        "triplets",
-        np.concatenate([[0.0, 0.0, t.h_corr, t.d_12, 0.0] for t in units]),
-        np.stack([np.diag(np.square(row)) for row in u]),
-        at.first,
-        at.first + 3,
-        at.first + BALL,
-        at.first[:, None] + (TILT, TILT + 1),
-        np.stack([t.normal for t in units]),
-        np.stack([at.offsets, at.offsets + 1, no_columns, no_columns, no_columns], axis=1),
+        name="triplets",
+        observed=np.concatenate([[0.0, 0.0, t.h_corr, t.d_12, 0.0] for t in units]),
+        covariance=np.stack([np.diag(np.square(row)) for row in u]),
+        left=at.first,
+        right=at.first + 3,
+        ball=at.first + BALL,
+        tilt=at.first[:, None] + (TILT, TILT + 1),
+        start=np.stack([t.normal for t in units]),
+        offset=np.stack([at.offsets, at.offsets + 1, no_columns, no_columns, no_columns], axis=1),
     )
     shared, which = np.unique(at.offsets, return_index=True)
     return (

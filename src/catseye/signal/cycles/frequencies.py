@@ -75,13 +75,13 @@ def modulation_set(
     near = np.sqrt(square)
     alias = lengths[near < 2.0 * SURE]
     return ModulationSet(
-        tuple(float(v) for v in f),
-        float(span),
-        float(near.min()),
-        float(lengths[np.argmax(near <= near.min() + 1e-6)]),
-        float(alias.min()) if len(alias) else None,
-        u_length,
-        float(min(1.0, np.sum(2.0 * upper_tail(0.5 * near)))),
+        frequencies_hz=tuple(float(v) for v in f),
+        span=float(span),
+        separation=float(near.min()),
+        nearest=float(lengths[np.argmax(near <= near.min() + 1e-6)]),
+        first_alias=float(alias.min()) if len(alias) else None,
+        u_length=u_length,
+        slip_probability=float(min(1.0, np.sum(2.0 * upper_tail(0.5 * near)))),
     )
 
 

@@ -187,7 +187,16 @@ class _Answer:
     def shaped(self, shape: tuple[int, ...]) -> JointLength:
         length, u_length, misfit, following, apart, slip = (v.reshape(shape) for v in self.floats)
         cycles = self.cycles.reshape(*shape, self.cycles.shape[1])
-        return JointLength(length, u_length, cycles, misfit, following, apart, slip, self.status.reshape(shape))
+        return JointLength(
+            length=length,
+            u_length=u_length,
+            cycles=cycles,
+            misfit=misfit,
+            next_length=following,
+            discrimination=apart,
+            slip_probability=slip,
+            status=self.status.reshape(shape),
+        )
 
 
 def _refuse_alias(f: NDArray[np.float64], u_phase: NDArray[np.float64], span: float, group_index: float) -> None:

@@ -184,7 +184,9 @@ def decision(
     slip = np.where(
         finite, slip_probability(np.where(finite, misfit, 0.0), np.where(finite, u, 0.0), 2 * quarter), np.nan
     )
-    return CycleDecision(cycles, margin, misfit, u, slip, status.astype(np.int8))
+    return CycleDecision(
+        cycles=cycles, margin=margin, misfit=misfit, u=u, slip_probability=slip, status=status.astype(np.int8)
+    )
 
 
 def slip_probability(misfit: ArrayLike, u: ArrayLike, half_wavelength: ArrayLike) -> NDArray[np.float64]:

@@ -229,7 +229,7 @@ class DelayPlan:
             arrivals[status > ECHO, 1] = np.nan
             arrivals[status >= SILENT] = np.nan
         delay, u, amplitude, snr, rival = (column.reshape(batch) for column in arrivals.T)
-        return Delays(delay, u, amplitude, snr, rival, status.reshape(batch))
+        return Delays(delay=delay, u_delay=u, amplitude=amplitude, snr=snr, rival=rival, status=status.reshape(batch))
 
     def correlation(self, recording: ArrayLike, expected: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Correlation J over the window, for a figure.

@@ -154,7 +154,9 @@ def inspect_buffers(
         part = detect(block, n, volts_per_code, converter_ends=converter_ends, harmonics=harmonics)
         status[members] = _judged(part, has_long_run(block, shortest_run(n)), weakest)
         _copy_rows(detection, members, part)
-    return Inspection(status, detection, length, n, cycles, weakest)
+    return Inspection(
+        status=status, detection=detection, length=length, samples_per_cycle=n, cycles=cycles, weakest=weakest
+    )
 
 
 def status_of(detection: Detection, *, weakest: float = 0.0) -> NDArray[np.int8]:

@@ -139,13 +139,13 @@ def noise_spectrum(series: ArrayLike, interval: float, *, false_alarm: float = 0
         for line, part, chance in zip(lines, parts, chances, strict=True)
     ]
     return NoiseSpectrum(
-        squares,
-        covariance,
-        tuple(sorted(spurs, key=lambda s: -s.amplitude)),
-        v / interval,
-        first * interval,
-        model * interval,
-        slope / interval,
+        squares=squares,
+        covariance=covariance,
+        spurs=tuple(sorted(spurs, key=lambda s: -s.amplitude)),
+        frequency=v / interval,
+        density=first * interval,
+        model=model * interval,
+        drift=slope / interval,
     )
 
 

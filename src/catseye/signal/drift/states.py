@@ -59,13 +59,13 @@ class DriftStates:
         width = int((columns[:, 2:] >= 0).sum(axis=1).max(initial=0))
         order = np.concatenate([np.broadcast_to([0, 1], (len(columns), 2)), order[:, :width]], axis=1)
         return DriftStates(
-            np.take_along_axis(columns, order, axis=1),
-            np.take_along_axis(np.where(dropped, 0.0, self.slopes), order, axis=1),
-            self.own + np.sum(np.where(dropped, self.slopes, 0.0) ** 2, axis=1),
-            np.where(self.prior_columns < 0, -1, number[self.prior_columns])[retained],
-            self.prior_slopes[retained],
-            self.strength[retained[first:]],
-            float(self.strength[~retained[first:]].max()),
+            columns=np.take_along_axis(columns, order, axis=1),
+            slopes=np.take_along_axis(np.where(dropped, 0.0, self.slopes), order, axis=1),
+            own=self.own + np.sum(np.where(dropped, self.slopes, 0.0) ** 2, axis=1),
+            prior_columns=np.where(self.prior_columns < 0, -1, number[self.prior_columns])[retained],
+            prior_slopes=self.prior_slopes[retained],
+            strength=self.strength[retained[first:]],
+            neglected=float(self.strength[~retained[first:]].max()),
         )
 
     def of(self, keep: np.ndarray) -> "DriftStates":
@@ -147,12 +147,12 @@ def drift_states(
         mode_slopes[rows[:, None], np.arange(len(own_columns))] = loading
     fresh = np.arange(r, states)
     return DriftStates(
-        np.concatenate([*columns, mode_columns], axis=1),
-        np.concatenate([*slopes, mode_slopes], axis=1),
-        np.zeros(m),
-        np.concatenate([prior_columns, np.stack([fresh, np.full(len(fresh), -1)], axis=1)]),
-        np.concatenate([prior_slopes, np.stack([np.ones(len(fresh)), np.zeros(len(fresh))], axis=1)]),
-        np.concatenate([np.zeros(0), *strength]),
+        columns=np.concatenate([*columns, mode_columns], axis=1),
+        slopes=np.concatenate([*slopes, mode_slopes], axis=1),
+        own=np.zeros(m),
+        prior_columns=np.concatenate([prior_columns, np.stack([fresh, np.full(len(fresh), -1)], axis=1)]),
+        prior_slopes=np.concatenate([prior_slopes, np.stack([np.ones(len(fresh)), np.zeros(len(fresh))], axis=1)]),
+        strength=np.concatenate([np.zeros(0), *strength]),
     )
 
 

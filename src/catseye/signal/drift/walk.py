@@ -91,7 +91,14 @@ def estimate_walk(
     u = np.sqrt(np.diag(covariance))
     half = [float(u[i] / (2.0 * root[i])) if root[i] > 0.0 else float("inf") for i in (0, 1)]
     degrees = float(2.0 * theta[0] ** 2 / covariance[0, 0])
-    return Walk(float(root[0]), half[0], float(root[1]), half[1] if white else 0.0, covariance, degrees)
+    return Walk(
+        random_walk=float(root[0]),
+        u_random_walk=half[0],
+        white=float(root[1]),
+        u_white=half[1] if white else 0.0,
+        covariance=covariance,
+        degrees=degrees,
+    )
 
 
 @dataclass(frozen=True)

@@ -217,7 +217,14 @@ def circle_leakage(phasor: ArrayLike, u_phasor: ArrayLike) -> Leakage:
             degrees = len(z) - 3
             factor = float(np.sum((residual / u) ** 2)) / degrees
             centre = covariance[:2, :2]
-            return Leakage(complex(point[0], point[1]), centre, centre, residual, factor, degrees)
+            return Leakage(
+                phasor=complex(point[0], point[1]),
+                covariance=centre,
+                covariance_in_use=centre,
+                residual=residual,
+                variance_factor=factor,
+                degrees_of_freedom=degrees,
+            )
     raise EstimationError("the phasors do not form a circle: move the retroreflector over more of a half wavelength")
 
 
@@ -261,7 +268,14 @@ def rail_leakage(
     covariance = float(np.sum(np.abs(inverse[0]) ** 2)) * np.eye(2)
     degrees = 2 * (len(z) - len(columns))
     factor = float(np.sum(np.abs(residual / u) ** 2)) / degrees
-    return Leakage(complex(inverse[0] @ (z / u)), covariance, covariance, residual, factor, degrees)
+    return Leakage(
+        phasor=complex(inverse[0] @ (z / u)),
+        covariance=covariance,
+        covariance_in_use=covariance,
+        residual=residual,
+        variance_factor=factor,
+        degrees_of_freedom=degrees,
+    )
 
 
 def quadrature_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) -> Array:

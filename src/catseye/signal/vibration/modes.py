@@ -86,7 +86,14 @@ def find_modes(
             f"{MOST_DAMPING}): not a vibration; look for fewer modes"
         )
     apart = tuple(
-        Mode(float(frequency[k]), float(damping[k]), np.diag(sizes[k] ** 2), u[k] / TWO_PI, u[count + k], drift_hz)
+        Mode(
+            frequency_hz=float(frequency[k]),
+            damping_ratio=float(damping[k]),
+            covariance=np.diag(sizes[k] ** 2),
+            u_frequency_hz=u[k] / TWO_PI,
+            u_damping=u[count + k],
+            drift_hz=drift_hz,
+        )
         for k in range(count)
     )
     return _correlated(apart, t, y, u_sample, window)

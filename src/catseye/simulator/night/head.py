@@ -158,7 +158,9 @@ def returns_of_ranger(
         if shot.target == REFERENCE:
             unit_phasor = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * end_index[i] * head.true_d0))
             phasor = REFERENCE_VOLT * unit_phasor + head.true_leakage
-            returns.append(Return(shot, complex(phasor), "good", 1.0, head.true_d0, 0.0))
+            returns.append(
+                Return(shot=shot, phasor=complex(phasor), status="good", index=1.0, range=head.true_d0, phase_error=0.0)
+            )
             continue
         away = scan[i] - ends[i]
         distance = float(np.linalg.norm(away))
@@ -174,7 +176,16 @@ def returns_of_ranger(
             remaining, strange = foreign_return(amplitude, foreign[i])
         error = float(np.angle(remaining + strange)) if status == "reflected" else 0.0
         phasor = unit_phasor * (remaining + strange) + head.true_leakage
-        returns.append(Return(shot, complex(phasor), status, float(index[i]), distance, error))
+        returns.append(
+            Return(
+                shot=shot,
+                phasor=complex(phasor),
+                status=status,
+                index=float(index[i]),
+                range=distance,
+                phase_error=error,
+            )
+        )
     return returns
 
 

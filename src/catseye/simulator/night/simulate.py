@@ -198,7 +198,9 @@ def _site(
     for ranger in planted.d0_error_mm:
         if ranger not in heads:
             raise InputError(f"a D0 error planted on {ranger!r}: expected a ranger, ZY101 to ZY118")
-    return NightSite(heads, monuments, marks, pose, telescope, cubes, points)
+    return NightSite(
+        heads=heads, monuments=monuments, marks=marks, pose=pose, telescope=telescope, cubes=cubes, points=points
+    )
 
 
 def _plan(site: NightSite, rule: Schedule, faults: Faults, streams: Streams) -> dict[str, list[ScheduledShot]]:
@@ -225,7 +227,15 @@ def _moving(
         expansion |= dict.fromkeys(on_dish, law.dish_share) | dict.fromkeys(on_arm, law.arm_share)
     centre, on_alidade = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)]), frozenset(on_dish + on_arm)
     middle = 0.5 * (min(seconds) + max(seconds))
-    return MovingPoints(site.points, air, law, middle, expansion, site.pose.dish(centre), on_alidade)
+    return MovingPoints(
+        points=site.points,
+        air=air,
+        law=law,
+        reference_s=middle,
+        own=expansion,
+        dish_middle=site.pose.dish(centre),
+        carried=on_alidade,
+    )
 
 
 def benchmark_targets(marks: list[TrueBenchmark], streams: Streams, planted: Planted) -> list[TrueTarget]:

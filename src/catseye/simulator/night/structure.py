@@ -229,7 +229,17 @@ def triplet(number: int, count: int, pose: TruePosture, *, streams: Streams, pla
         sizes=tuple(float(r) for r in true_radii),
     )
     l_mpbc_mm = round(float(h_mm + miss[1] + miss[4]), 3)
-    return TrueTriplet(name, typed, normal, axis, d12_mm, h_mm, l_mpbc_mm, ball, (prisms[0], prisms[1], looker))
+    return TrueTriplet(
+        name=name,
+        position_mm=typed,
+        normal=normal,
+        axis=axis,
+        d12_mm=d12_mm,
+        h_corr_mm=h_mm,
+        l_mpbc_mm=l_mpbc_mm,
+        design=ball,
+        targets=(prisms[0], prisms[1], looker),
+    )
 
 
 def structure(
@@ -249,7 +259,15 @@ def structure(
     fixed, design = structural_targets(pose, streams, planted)
     design |= {f"{t.name}-B": pose.nominal(t.design) for t in units}
     dish, fixed, units, wrong = mistype(dish, fixed, units, wrong_mm=faults.wrong_position_mm, streams=streams)
-    return Structure(arm, dish, units, fixed, aim_mm, design, wrong)
+    return Structure(
+        feed_arm=arm,
+        dish=dish,
+        triplets=units,
+        structural=fixed,
+        aim_point_mm=aim_mm,
+        design=design,
+        wrongly_typed=wrong,
+    )
 
 
 def structural_targets(pose: TruePosture, streams: Streams, planted: Planted):

@@ -132,7 +132,7 @@ class ServoAxis:
         rows[0] /= FRACTION
         rows[1] *= per_second
         time: NDArray[np.float64] = (begin + np.arange(samples, dtype=np.float64)) * motor.sample
-        return AxisTrace(time, *rows)
+        return AxisTrace(time=time, **dict(zip(COLUMNS, rows, strict=True)))
 
     def skip(self, samples: int) -> None:
         """Let time pass without a record."""
@@ -371,7 +371,7 @@ class ServoAxis:
             if not started:
                 raise ValidityError("ABA: the acceleration was changed during a move (expected the same until it ends)")
             rows.append(self.run(samples))
-        return AxisTrace(*(np.concatenate([getattr(row, name) for row in rows]) for name in ("time", *COLUMNS)))
+        return AxisTrace(**{name: np.concatenate([getattr(row, name) for row in rows]) for name in ("time", *COLUMNS)})
 
     def _samples_of(self, seconds: float) -> int:
         if not np.isfinite(seconds):

@@ -67,15 +67,15 @@ class LivingAir:
         ).scaled(planted.gain("weather_wander"))
         vapour = saturation_hpa(c.temperature_c, c.pressure_hpa) * c.humidity_percent / 100.0
         return LivingAir(
-            c,
-            float((start_mjd % 1.0) * 24.0 + site.site.site.longitude_deg / 15.0),
-            slope,
-            wander,
-            planted.gain("stratification"),
-            planted.gain("diurnal"),
-            planted.gain("dew"),
-            float(_dew_point_c(vapour, c.pressure_hpa)),
-            PassingAir.of(c, streams=streams, planted=planted),
+            conditions=c,
+            start_hour=float((start_mjd % 1.0) * 24.0 + site.site.site.longitude_deg / 15.0),
+            slope=slope,
+            wander=wander,
+            stratification=planted.gain("stratification"),
+            diurnal=planted.gain("diurnal"),
+            dew=planted.gain("dew"),
+            dew_point_c=float(_dew_point_c(vapour, c.pressure_hpa)),
+            passing=PassingAir.of(c, streams=streams, planted=planted),
         )
 
     def sunshine(self, seconds: ArrayLike) -> Array:

@@ -66,7 +66,9 @@ class TwinPlaces:
         self.retros: dict[str, BodyRetroreflector] = retroreflectors(site, certified, draw)
         for name, s in self.stations.items():  # a ranger shows others the retroreflector in its mirror's back
             rest_place = s.place if s.body == "arm" else certified[name]
-            self.retros[name] = BodyRetroreflector(HOLLOW, s.body, rest_place, None, (), USUAL_VOLT["arm"])
+            self.retros[name] = BodyRetroreflector(
+                kind=HOLLOW, body=s.body, rest_place=rest_place, facing=None, sizes=(), volts=USUAL_VOLT["arm"]
+            )
         self._surface = draw.surface
         self._dish_middle = np.array([*draw.surface.centre, draw.surface.height(draw.surface.centre)])
         self._crowds = {body: self._crowd(body) for body in ("ground", "alidade", "dish", "arm")}

@@ -233,7 +233,16 @@ class Twin:
             generator=self._streams(f"shot/{ranger}/{target}/{ticks}"),
             gain=1.0 if hot is None else hot.size,
         )
-        return LiveShot(ranger, target, ticks, cycles, samples, if_hz, VOLT_PER_CODE, codes)
+        return LiveShot(
+            ranger=ranger,
+            target=target,
+            ticks=ticks,
+            cycles=cycles,
+            samples_per_cycle=samples,
+            if_hz=if_hz,
+            volts_per_code=VOLT_PER_CODE,
+            samples=codes,
+        )
 
 
 def _times(seconds: ArrayLike) -> Array:

@@ -208,23 +208,26 @@ def _station(
     axes = [mirror.axis_offset_mm, mirror.mirror_offset_mm, mirror.beam_x_mm, mirror.beam_y_mm]
     tilts = [mirror.face_tilt_rad, mirror.beam_tilt_x_rad, mirror.beam_tilt_y_rad]
     offset = true([mirror.dx_mm, mirror.dy_mm, mirror.dz_mm], mirror.u_offset_mm, MILLIMETRE)
+    sinks, sways, leans = settle
     return TrueStation(
-        name,
-        body,
-        place,
-        gamma,
-        turning(np.array([-beta[0], 0.0, 0.0])) @ turning(np.array([0.0, -beta[1], 0.0])),
-        planted.gain("mirror_offset") * offset,
-        true([mirror.na0, mirror.ne0], U_ZERO if mirror.u_zero_counts is None else mirror.u_zero_counts),
-        true(axes, mirror.u_axis_mm, MILLIMETRE),
-        true(tilts, mirror.u_tilt_rad),
-        true(_waves(mirror), mirror.u_encoder_counts),
-        d0 * MILLIMETRE,
-        planted.gain("leakage") * leakage,
-        np.array([mirror.azm_zrg, mirror.elv_zrg], dtype=float),
-        float(true(mirror.amplitude_to_phase_rad, mirror.u_amplitude_to_phase_rad)),
-        true(_cyclic(mirror), mirror.u_cyclic_mm, MILLIMETRE),
-        *settle,
+        name=name,
+        body=body,
+        place=place,
+        gamma=gamma,
+        lambda_=turning(np.array([-beta[0], 0.0, 0.0])) @ turning(np.array([0.0, -beta[1], 0.0])),
+        offset=planted.gain("mirror_offset") * offset,
+        zeros=true([mirror.na0, mirror.ne0], U_ZERO if mirror.u_zero_counts is None else mirror.u_zero_counts),
+        axes=true(axes, mirror.u_axis_mm, MILLIMETRE),
+        tilts=true(tilts, mirror.u_tilt_rad),
+        waves=true(_waves(mirror), mirror.u_encoder_counts),
+        d0=d0 * MILLIMETRE,
+        leakage=planted.gain("leakage") * leakage,
+        zrg=np.array([mirror.azm_zrg, mirror.elv_zrg], dtype=float),
+        amplitude_to_phase=float(true(mirror.amplitude_to_phase_rad, mirror.u_amplitude_to_phase_rad)),
+        cyclic=true(_cyclic(mirror), mirror.u_cyclic_mm, MILLIMETRE),
+        sinks=sinks,
+        sways=sways,
+        leans=leans,
     )
 
 

@@ -129,7 +129,12 @@ def retroreflectors(site: SiteFolder, scan_points: Mapping[str, Array], draw: Dr
             miss = gain * row.u_mm * draw.streams(f"benchmark/{row.target}").normal()
             rest_place = station + unit(old.rest_place - station) * (row.certified_distance_mm + miss) * MILLIMETRE
             drawn[row.target] = BodyRetroreflector(
-                old.kind, old.body, rest_place, old.facing, old.sizes, BENCHMARK_VOLT
+                kind=old.kind,
+                body=old.body,
+                rest_place=rest_place,
+                facing=old.facing,
+                sizes=old.sizes,
+                volts=BENCHMARK_VOLT,
             )
     return drawn
 
@@ -161,7 +166,9 @@ def single(record: TargetRecord, draw: Drawing) -> BodyRetroreflector:
         sizes = ((record.height_mm + u * rng.normal()) * MILLIMETRE,)
     body = draw.body(record.frame, rest_place)
     volts = USUAL_VOLT["single" if facing is None else "dish" if body == "dish" else "plate"]
-    return BodyRetroreflector(record.kind, body, rest_place, facing, sizes, volts)
+    return BodyRetroreflector(
+        kind=record.kind, body=body, rest_place=rest_place, facing=facing, sizes=sizes, volts=volts
+    )
 
 
 def triplet(record: TripletRecord, draw: Drawing) -> dict[str, BodyRetroreflector]:
@@ -189,13 +196,23 @@ def triplet(record: TripletRecord, draw: Drawing) -> dict[str, BodyRetroreflecto
     def prism(side: TripletPrism, sign: float) -> BodyRetroreflector:
         height = (side.height_mm + gain("calibration") * side.u_height_mm * rng.normal()) * MILLIMETRE
         return BodyRetroreflector(
-            side.kind, body, middle + sign * 0.5 * d12 * axis, normal, (height,), USUAL_VOLT["plate"]
+            kind=side.kind,
+            body=body,
+            rest_place=middle + sign * 0.5 * d12 * axis,
+            facing=normal,
+            sizes=(height,),
+            volts=USUAL_VOLT["plate"],
         )
 
     return {
         record.left_prism.target: prism(record.left_prism, -1.0),
         record.right_prism.target: prism(record.right_prism, 1.0),
         record.ball.target: BodyRetroreflector(
-            record.ball.kind, body, ball, -normal, (r1, r2), USUAL_VOLT["underside"]
+            kind=record.ball.kind,
+            body=body,
+            rest_place=ball,
+            facing=-normal,
+            sizes=(r1, r2),
+            volts=USUAL_VOLT["underside"],
         ),
     }

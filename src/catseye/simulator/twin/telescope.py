@@ -183,13 +183,13 @@ def telescope(
     nominal = site.site.frames.reflector
     conditions, dish = air.conditions, float(streams("dish expansion").uniform(-1.0, 1.0))
     return Telescope(
-        motion,
-        site.site.site.latitude_deg * DEGREE,
-        start_mjd,
-        air,
-        np.array(nominal.reflector_to_elevation_mm) * MILLIMETRE,
-        nominal.elevation_axis_height_mm * MILLIMETRE,
-        site.site.campaign.elevation_deg * DEGREE,
+        motion=motion,
+        latitude=site.site.site.latitude_deg * DEGREE,
+        start_mjd=start_mjd,
+        air=air,
+        reflector_to_elevation=np.array(nominal.reflector_to_elevation_mm) * MILLIMETRE,
+        axis_height=nominal.elevation_axis_height_mm * MILLIMETRE,
+        rest_elevation=site.site.campaign.elevation_deg * DEGREE,
         rigid_shift=rigid * residual[0] * 3.0 * MILLIMETRE,
         rigid_turn=turning(rigid * turn),
         arm=arm * np.concatenate([residual[2] * 4.0 * MILLIMETRE, residual[3] * 12.0 * ARCSECOND]),

@@ -56,12 +56,12 @@ def thermometers(
         )
         lag, warm = streams(f"thermometer nature/{name}").uniform(size=2)
         drawn[name] = Thermometer(
-            place,
-            float(offset),
-            abs(planted.gain("thermometer_lag")) * c.thermometer_lag * float(lag),
-            planted.gain("radiation_error") * c.radiation_c * float(warm),
-            start_mjd,
-            site.site.site.latitude_deg,
-            site.site.site.longitude_deg,
+            place=place,
+            offset_c=float(offset),
+            lag=abs(planted.gain("thermometer_lag")) * c.thermometer_lag * float(lag),
+            radiation_c=planted.gain("radiation_error") * c.radiation_c * float(warm),
+            start_mjd=start_mjd,
+            latitude_deg=site.site.site.latitude_deg,
+            longitude_deg=site.site.site.longitude_deg,
         )
     return drawn

@@ -56,7 +56,7 @@ class Sightings:
 
     def only(self, chosen: np.ndarray) -> "Sightings":
         """Selected rows, by mask (m,) or indices."""
-        return Sightings(*(getattr(self, name)[chosen] for name in self.__dataclass_fields__))
+        return Sightings(**{name: getattr(self, name)[chosen] for name in self.__dataclass_fields__})
 
     def __len__(self) -> int:
         return len(self.code)
@@ -89,8 +89,17 @@ def sightings(network: ObservationNetwork) -> Sightings:
         elif (table := _of_group(group, variance, start)) is not None:
             tables.append(table)
     if not tables:
-        return Sightings(*(np.zeros(0, int),) * 3, np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, int))
-    return Sightings(*(np.concatenate([getattr(t, name) for t in tables]) for name in Sightings.__dataclass_fields__))
+        return Sightings(
+            code=np.zeros(0, int),
+            origin=np.zeros(0, int),
+            target=np.zeros(0, int),
+            observed=np.zeros(0),
+            shift=np.zeros((0, 3)),
+            sigma=np.zeros(0),
+            which=np.zeros(0, int),
+        )
+    names = Sightings.__dataclass_fields__
+    return Sightings(**{name: np.concatenate([getattr(t, name) for t in tables]) for name in names})
 
 
 def _table(

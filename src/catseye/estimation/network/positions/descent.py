@@ -51,8 +51,10 @@ class Descent:
 
     def where(self, first: np.ndarray, alternative: "Descent") -> "Descent":
         """Lanes of this one if `first`, else of the other."""
-        pairs = ((getattr(self, f.name), getattr(alternative, f.name)) for f in fields(Descent))
-        return Descent(*(np.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs))
+        pairs = {f.name: (getattr(self, f.name), getattr(alternative, f.name)) for f in fields(Descent)}
+        return Descent(
+            **{name: np.where(first.reshape(-1, *[1] * (a.ndim - 1)), a, b) for name, (a, b) in pairs.items()}
+        )
 
     def replace_lanes(self, lanes: np.ndarray, source: "Descent") -> None:
         """Replace some lanes by another descent's ends."""

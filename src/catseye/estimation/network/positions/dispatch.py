@@ -137,7 +137,7 @@ def positions(
 
     def work(first: int) -> None:
         rows = slice(first, first + size)
-        part = Positions(*(getattr(out, f.name)[rows] for f in fields(Positions)))
+        part = Positions(**{f.name: getattr(out, f.name)[rows] for f in fields(Positions)})
         chunk = targets.of(rows)
         lanes = np.arange(len(chunk.d)) if fast is None else np.flatnonzero(~fast(chunk, part))
         if len(lanes):

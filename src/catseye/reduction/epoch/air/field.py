@@ -423,7 +423,9 @@ class _Nodes:
         share, profile = field._shares(z)
         heights = field.heights
         zeta = (z - heights.mean()) / LEVEL_HEIGHT if field.profile == "gradient" else _zeta(z, heights)
-        return _Nodes(z, east, north, zeta, share, profile, nodes_along(0.0, 1.0, NODES)[1])
+        return _Nodes(
+            z=z, east=east, north=north, zeta=zeta, share=share, profile=profile, weight=nodes_along(0.0, 1.0, NODES)[1]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -463,15 +465,15 @@ class _Weather:
         if len(errors) > 1:
             temperature = temperature - errors[1] * sun[:, None]
         return _Weather(
-            temperature,
-            rate,
-            state[:, :, 1].mean(axis=1),
-            state[:, :, 2].mean(axis=1),
-            process,
-            sun,
-            float(values[s]),
-            share,
-            float(field.heights.mean()),
+            temperature=temperature,
+            rate=rate,
+            pressure=state[:, :, 1].mean(axis=1),
+            humidity=state[:, :, 2].mean(axis=1),
+            process=process,
+            sun=sun,
+            profile=float(values[s]),
+            share=share,
+            middle=float(field.heights.mean()),
         )
 
     def of_rows(self, rows: np.ndarray) -> "_Weather":
