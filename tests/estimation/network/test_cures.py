@@ -1,11 +1,13 @@
 """Reasons are tried on a copy: the planted one is named with the variance factor of its cure, others are not."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network
+from catseye.estimation.network.cures import _scaled
 from catseye.estimation.network.model import NetworkPoints, ObservationNetwork
 from catseye.estimation.observations.kinds import Distances
 from catseye.records.network.gama import gama_network
@@ -194,3 +196,19 @@ def test_coplanar_stations_are_diagnosed_as_mirror_image_not_zero(sigma, targets
     assert "mirror image" in status or "two positions fit" in status
     assert "zero" not in status
     assert "scale" not in status
+
+
+@pytest.mark.parametrize(("size", "unit"), [(1e3, "millimetres"), (1.0 / 0.3048, "feet")])
+def test_distances_in_another_unit_are_named(size, unit):
+    rng, names = np.random.default_rng(31), tuple(f"P{k}" for k in range(7))
+    xyz = rng.uniform(0.0, 100.0, (7, 3))
+    ends = np.array([(i, j) for i in range(7) for j in range(i)])
+    distance = np.linalg.norm(xyz[ends[:, 0]] - xyz[ends[:, 1]], axis=1) + 1e-4 * rng.standard_normal(len(ends))
+    ranges = Distances("d", size * distance, np.full(len(ends), 1e-8), 3 * ends[:, 0], 3 * ends[:, 1])
+    given = xyz + 0.01 * rng.standard_normal(xyz.shape)
+    datum = np.ones((7, 3), dtype=bool)
+    network = ObservationNetwork(NetworkPoints(names, given, np.zeros((7, 3), dtype=bool), datum), (), (ranges,))
+    status = adjust_network(network).status
+    assert f"times those between the given coordinates, as in {unit}: in metres the variance factor is" in status
+    apart = replace(ranges, observed=np.where(np.arange(len(ends)) < 4, size, 1.0) * distance)
+    assert list(_scaled(SimpleNamespace(network=replace(network, groups=(apart,))), adjust=None)) == []  # none is tried

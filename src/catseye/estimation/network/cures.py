@@ -35,6 +35,10 @@ TURNING = ("direction", "angle", "azimuth")  # kinds with a sense of rotation
 MIRRORED = "the sense of the horizontal angles is mirrored: reversed,"
 EXCHANGED = "with {first} and {second} exchanged"
 WITHOUT = "without {names}"
+SCALED = "the distances are {ratio:.4g} times those between the given coordinates, as in {unit}: in metres"
+UNITS = {"millimetres": 1e3, "centimetres": 1e2, "feet": 1.0 / 0.3048, "kilometres": 1e-3}  # of a metre
+FEWEST_RATIOS = 3  # distances between points with given coordinates
+NEAR_UNIT, SAME_RATIO = 0.02, 0.02  # of a ratio: to a unit's, and between its quartiles
 OPPOSITE = "{names} is half a turn off: without it"
 
 
@@ -66,6 +70,8 @@ def reason(solution: NetworkSolution, adjust: Adjust | None) -> NetworkReason:
     """
     if adjust is None:
         return NetworkReason(_where(solution), named=False)
+    for scaled in _scaled(solution, adjust):  # no search among single observations, which would take long
+        return NetworkReason(f"; {scaled.text} the variance factor is {scaled.factor:.3g}", named=True)
     cures = [*_mirrored(solution, adjust), *_exchanged(solution, adjust)]
     if not cures or solution.status != CONVERGED or _one_explains(solution):
         cures += _without_one(solution, adjust)
@@ -101,6 +107,29 @@ def _signed(group: ObservationGroup, sign: np.ndarray) -> ObservationGroup:
     if covariance.ndim == 2:
         covariance = covariance * np.outer(sign, sign)
     return cast(ObservationGroup, replace(cast(Any, group), observed=sign * group.observed, covariance=covariance))
+
+
+def _scaled(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
+    """All distances in another unit than metres, by their ratio to the given coordinates."""
+    network, ratios = solution.network, [np.zeros(0)]
+    for group in network.groups:
+        if isinstance(group, Distances):
+            origin, target = points_of(group)[:2]
+            given = np.linalg.norm(network.points.xyz[target] - network.points.xyz[origin], axis=1)
+            ratios.append((group.observed / np.where(given > 0.0, given, np.nan))[np.isfinite(given) & (given > 0.0)])
+    every = np.concatenate(ratios)
+    if len(every) < FEWEST_RATIOS:
+        return
+    low, ratio, high = np.quantile(every, (0.25, 0.5, 0.75))
+    for unit, size in UNITS.items():
+        if abs(ratio / size - 1.0) < NEAR_UNIT and high - low < SAME_RATIO * ratio:
+            groups = tuple(
+                replace(group, observed=group.observed / size) if isinstance(group, Distances) else group
+                for group in network.groups
+            )
+            trial = adjust(replace(network, groups=groups), None)
+            if fits(trial):
+                yield Cure(SCALED.format(ratio=ratio, unit=unit), 1, trial.variance_factor)
 
 
 def _mirrored(solution: NetworkSolution, adjust: Adjust) -> Iterator[Cure]:
