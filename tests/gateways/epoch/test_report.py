@@ -103,7 +103,7 @@ def test_names_and_notes_are_escaped(reduction):
 
 @pytest.mark.usefixtures("drawn_already")
 def test_report_without_dish_is_complete_otherwise(reduction):
-    blind = replace(reduction, surface=None, notes=("no paraboloid: two points",), rejected={})
+    blind = replace(reduction, surface=None, no_surface="no paraboloid: two points", rejected={})
     text = report(blind, WHEN)
     assert "No pose and no surface" in text
     assert [p.title for p in passages(blind)][3] == "The dish"

@@ -50,7 +50,7 @@ def test_the_covariance_of_all_points_is_written_with_its_order(written, reducti
 
 
 def test_campaign_without_dish_has_null_pose_and_a_reason(reduction):
-    blind = replace(reduction, surface=None, notes=("no paraboloid: it needs 5 points, 2 given",))
+    blind = replace(reduction, surface=None, no_surface="no paraboloid: it needs 5 points, 2 given")
     assert strict(json_line(reduction_object(blind)))["pose"] is None
     found = strict(json_page(pose_object(blind)))
     assert found["pose"] is None
