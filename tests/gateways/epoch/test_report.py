@@ -136,6 +136,7 @@ def test_a_part_of_the_night_is_reported_too(reduction, keep):
     }
     part = reduce_epoch(replace(reduction.campaign, shots=type(shots)(**columns)))
     text = report(part, WHEN)
-    assert "No pose and no surface" in text
+    assert "No pose and no surface: no paraboloid: " in text
+    assert pose_object(part)["reason"] == part.no_surface == part.notes[-1]
     assert len([line for line in ranges_csv(part).splitlines() if line]) == len(kept) + 1
     assert json_page(pose_object(part))

@@ -1,6 +1,7 @@
 """Explanations judged: what cannot be is refused, what nothing tells apart is allowed for."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,8 +23,10 @@ from catseye.reduction.epoch.allowance import (
     for_the_air,
     refused,
 )
+from catseye.reduction.epoch.notes import doubts_of
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.self_check import HEIGHT, TIME
+from catseye.reduction.live.thermometers import SuspectedBias, with_suspected_biases
 
 HEIGHTS = np.array([-2.6, 47.4])  # m, 50 apart
 SIGMA_C, SIGMA_BEND = 0.3, 0.03
@@ -289,3 +292,32 @@ def test_an_allowance_never_claims_less_than_the_records():
     large = Allowance(thermometers={"WX1": 2.0}, profile=0.2)
     np.testing.assert_array_equal(large.sigmas(air), [2.0, SIGMA_C, 0.2])
     np.testing.assert_array_equal(air.sigmas, [SIGMA_C, SIGMA_C, SIGMA_BEND])  # its own are not changed
+
+
+# -- a thermometer is judged once -------------------------------------------------------------------------------------
+
+
+def test_a_later_judgement_of_a_thermometer_replaces_the_earlier():
+    before = Allowance(
+        reasons=(
+            AllowanceReason("WX1 of an epoch before", thermometer("WX1")),
+            AllowanceReason("WX2 of an epoch before", thermometer("WX2")),
+            AllowanceReason("of no parameter"),
+        )
+    )
+    found = with_suspected_biases(before, {"WX1": SuspectedBias("biased", 1.65, 0.13)}, field())
+    assert found.texts[:2] == ("WX2 of an epoch before", "of no parameter")
+    assert found.reasons[2:] == (AllowanceReason(SuspectedBias("biased", 1.65, 0.13).text("WX1"), thermometer("WX1")),)
+    refuted = with_suspected_biases(before, {"WX1": SuspectedBias("biased", 1.65, 0.13)}, field(), refuted=("WX1",))
+    assert refuted.reasons == found.reasons[:2]  # its adjustment says so itself
+
+
+@pytest.mark.parametrize("named", ["by nothing", "as refuted", "by an allowance"])
+def test_a_thermometer_at_the_end_of_its_prior_is_doubted_unless_it_is_named_already(named):
+    air, off = field(), 3.0 * SIGMA_C
+    solution, columns = known(air, [off, 0.0], [0.05, 0.05])
+    reasons = (AllowanceReason("named", thermometer("WX1")),) if named == "by an allowance" else ()
+    network = SimpleNamespace(field=air, layout=SimpleNamespace(air=columns), allowance=Allowance(reasons=reasons))
+    doubts = doubts_of(network, solution, [], {thermometer("WX1"): off} if named == "as refuted" else {})
+    text = "WX1's thermometer is biased by +0.90 °C, 3.0 of its u"
+    assert doubts == {"by nothing": (text,), "as refuted": (), "by an allowance": ("named",)}[named]
