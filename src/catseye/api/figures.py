@@ -13,6 +13,7 @@ from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ArgumentError, InputError
+from catseye.names import AIR_MODEL
 from catseye.verdict import Verdict
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def plot_air(
     humidity_percent: Annotated[Any, In("percent", one=True)] = 50.0,
     *,
     wavelength_um: Annotated[Any, In("um", one=True)] = 0.780,
-    model: str = "ciddor_hill1999",
+    model: str = AIR_MODEL,
     co2_ppm: Annotated[Any, In("ppm", one=True)] = 450.0,
     u_temperature_c: Annotated[Any, In("deg_C", difference=True, one=True)] = 0.0,
     u_pressure_hpa: Annotated[Any, In("hPa", one=True)] = 0.0,

@@ -13,6 +13,7 @@ from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
 from catseye.errors import ArgumentError
+from catseye.names import NOTES_AIR_MODEL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,7 +144,7 @@ class NightResult(Result):
 def reduce(
     campaign: "str | os.PathLike[str] | Campaign" = "night-01",
     *,
-    air_model: str = "rueger1990",
+    air_model: str = NOTES_AIR_MODEL,
     progress: Progress | None = None,
 ) -> NightResult:
     """A night's samples to coordinates, pose and surface, nothing moving meanwhile.
@@ -279,7 +280,7 @@ def explain(
     campaign: "str | os.PathLike[str] | Campaign",
     shot: Annotated[Any, In("", whole=True)],
     *,
-    air_model: str = "rueger1990",
+    air_model: str = NOTES_AIR_MODEL,
     monte_carlo: Annotated[Any, In("", whole=True)] = 200_000,
     seed: Annotated[Any, In("", whole=True)] = 1,
     progress: Progress | None = None,

@@ -9,6 +9,7 @@ import numpy as np
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.atmosphere.index.model import IndexSensitivity
+from catseye.names import AIR_MODEL
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -106,7 +107,7 @@ def air(
     elevation_m: Annotated[Any, In("m")] = None,
     above_barometer_m: Annotated[Any, In("m")] = 0.0,
     wavelength_um: Annotated[Any, In("um")] = 0.780,
-    model: str = "ciddor_hill1999",
+    model: str = AIR_MODEL,
     co2_ppm: Annotated[Any, In("ppm")] = 450.0,
     u_temperature_c: Annotated[Any, In("deg_C", difference=True)] = 0.0,
     u_pressure_hpa: Annotated[Any, In("hPa")] = 0.0,

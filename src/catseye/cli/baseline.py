@@ -13,6 +13,7 @@ from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import AIR_MODELS, one_of
+from catseye.names import AIR_MODEL
 
 FEW = 12  # pillars whose distances a terminal is told
 UNKNOWN = "unknown in the record where not given"
@@ -82,7 +83,7 @@ class _Settings(NamedTuple):
     model: Annotated[
         str,
         typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula for the index of air."),
-    ] = "ciddor_hill1999"
+    ] = AIR_MODEL
     corrected: Annotated[
         bool, typer.Option("--corrected", help="Lengths contain the first velocity correction already.")
     ] = False

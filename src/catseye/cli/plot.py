@@ -9,6 +9,7 @@ import typer
 from catseye.cli.commands import Json, Quiet, app, uncertainty
 from catseye.cli.results import tell
 from catseye.cli.vocabularies import AIR_MODELS, one_of
+from catseye.names import AIR_MODEL
 
 if TYPE_CHECKING:
     from catseye.api.figures import FigureResult
@@ -124,7 +125,7 @@ def air(  # noqa: PLR0913 - its options are its command line
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
     model: Annotated[
         str, typer.Option("--model", metavar=AIR_MODELS, callback=one_of(AIR_MODELS), help="Formula of the index.")
-    ] = "ciddor_hill1999",
+    ] = AIR_MODEL,
     co2_ppm: Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide, ppm.")] = 450.0,
     u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
     u_pressure_hpa: Annotated[float, typer.Option(help="Standard uncertainty of the pressure, hPa.", **U)] = 0.0,

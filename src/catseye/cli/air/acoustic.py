@@ -9,6 +9,7 @@ from catseye.cli.commands import AirModel, Json, Quiet, app
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import THERMOMETRY_MODELS, one_of
+from catseye.names import AIR_MODEL
 
 
 @app.command(
@@ -39,7 +40,7 @@ def acoustic(  # noqa: PLR0913 - its options are its command line
             help="Formula for the speed of sound.",
         ),
     ] = "real_gas",
-    air_model: AirModel = "ciddor_hill1999",
+    air_model: AirModel = AIR_MODEL,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,
