@@ -83,7 +83,7 @@ def test_the_surface_has_a_row_a_prism(written, reduction):
 
 
 def test_the_corrections_of_a_range_add_up_to_it_and_its_phase_is_a_difference(written):
-    """As docs/formats/results.md says; 0.5 um: eight cells of four decimals, two of seven."""
+    """The sum on docs/formats/results.md, to 0.5 um: eight cells of four decimals, two of seven."""
     parts = ["air", "d0", "zero", "glass", "obliquity", "leakage", "head", "moved"]
     rows = [row for row in read(written / "ranges.csv") if row["range_m"]]
     assert len(rows) > 600

@@ -7,6 +7,7 @@ import typer
 from catseye.cli.commands import Json, app, uncertainty
 from catseye.cli.results import tell
 from catseye.cli.vocabularies import AIR_MODELS, one_of
+from catseye.names import AIR_MODEL
 
 U = {"callback": uncertainty}
 Temperature = Annotated[float, typer.Option("--temperature-c", help="Air temperature, °C.")]
@@ -25,29 +26,34 @@ def air(  # noqa: PLR0913 - its options are its command line
     temperature_c: Temperature,
     pressure_hpa: Annotated[float | None, typer.Option("--pressure-hpa", help="Total pressure, hPa.")] = None,
     humidity_percent: Annotated[
-        float | None, typer.Option("--humidity-percent", help="Relative humidity over liquid water, %; or:")
+        float | None,
+        typer.Option("--humidity-percent", help="Relative humidity over liquid water, %, or one of the next five."),
     ] = None,
-    dew_point_c: Annotated[float | None, typer.Option("--dew-point-c", help="dew point of a mirror, °C;")] = None,
-    frost_point_c: Annotated[float | None, typer.Option("--frost-point-c", help="frost point of a mirror, °C;")] = None,
-    wet_bulb_c: Annotated[float | None, typer.Option("--wet-bulb-c", help="wet bulb of a psychrometer, °C;")] = None,
+    dew_point_c: Annotated[float | None, typer.Option("--dew-point-c", help="Dew point of a mirror, °C.")] = None,
+    frost_point_c: Annotated[float | None, typer.Option("--frost-point-c", help="Frost point of a mirror, °C.")] = None,
+    wet_bulb_c: Annotated[float | None, typer.Option("--wet-bulb-c", help="Wet bulb of a psychrometer, °C.")] = None,
     ice_bulb_c: Annotated[
-        float | None, typer.Option("--ice-bulb-c", help="wet bulb of a psychrometer, frozen, °C;")
+        float | None, typer.Option("--ice-bulb-c", help="Wet bulb of a psychrometer, frozen, °C.")
     ] = None,
     vapour_pressure_hpa: Annotated[
-        float | None, typer.Option("--vapour-pressure-hpa", help="partial pressure of the vapour, hPa.")
+        float | None, typer.Option("--vapour-pressure-hpa", help="Partial pressure of the vapour, hPa.")
     ] = None,
     barometer_mmhg: Annotated[
-        float | None, typer.Option("--barometer-mmhg", help="Mercury as read, mm, instead of --pressure-hpa;")
+        float | None, typer.Option("--barometer-mmhg", help="Mercury column as read, mm; replaces --pressure-hpa.")
     ] = None,
-    mercury_c: Annotated[float | None, typer.Option("--mercury-c", help="temperature of the mercury, °C;")] = None,
-    gravity: Annotated[float | None, typer.Option("--gravity", help="gravity at the barometer, m/s²; or")] = None,
-    latitude_deg: Annotated[float | None, typer.Option("--latitude-deg", help="latitude, degrees, and")] = None,
-    elevation_m: Annotated[float | None, typer.Option("--elevation-m", help="elevation above the sea, m.")] = None,
+    mercury_c: Annotated[float | None, typer.Option("--mercury-c", help="Temperature of the mercury, °C.")] = None,
+    gravity: Annotated[float | None, typer.Option("--gravity", help="Gravity at the barometer, m/s².")] = None,
+    latitude_deg: Annotated[
+        float | None, typer.Option("--latitude-deg", help="Latitude, degrees, for gravity where none is given.")
+    ] = None,
+    elevation_m: Annotated[
+        float | None, typer.Option("--elevation-m", help="Elevation above sea level, m, for the same.")
+    ] = None,
     above_barometer_m: Annotated[
         float, typer.Option("--above-barometer-m", help="Height of this air above the barometer, m.")
     ] = 0.0,
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
-    model: Model = "ciddor_hill1999",
+    model: Model = AIR_MODEL,
     co2_ppm: CarbonDioxide = 450.0,
     u_temperature_c: Annotated[float, typer.Option(help="Standard uncertainty of the temperature, °C.", **U)] = 0.0,
     u_pressure_hpa: Annotated[float, typer.Option(help="Standard uncertainty of the pressure, hPa.", **U)] = 0.0,

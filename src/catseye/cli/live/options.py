@@ -33,7 +33,8 @@ MotionText = Annotated[
     typer.Option(
         "--motion",
         metavar="MOTION",
-        help="fixed AZ EL, track AZ EL, slew AZ0 EL0 AZ1 EL1, scan AZ EL WIDTH RATE (degrees), or table FILE.",
+        help="Motion of the telescope: fixed AZ EL, track AZ EL, slew AZ0 EL0 AZ1 EL1, scan AZ EL WIDTH RATE "
+        "(degrees), or table FILE.",
     ),
 ]
 Start = Annotated[
