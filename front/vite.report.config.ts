@@ -1,0 +1,12 @@
+import { defineConfig } from "vite";
+
+// The script and style of reports: one file each, put into every report by the writers.
+export default defineConfig({
+  publicDir: false,
+  build: {
+    outDir: "../src/catseye/gateways/writers/static",
+    emptyOutDir: true,
+    target: "es2022",
+    lib: { entry: "src/report.ts", formats: ["iife"], name: "catseyeReport", fileName: () => "report.js", cssFileName: "report" },
+  },
+});
