@@ -7,7 +7,7 @@ STAMP := .venv/.catseye-installed
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(1 + (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()))')
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: help setup check style types test tests test-all demo bench release clean
+.PHONY: help setup check style types test tests test-all test-web front front-check demo bench release clean
 
 help:  ## list the verbs
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -15,7 +15,7 @@ help:  ## list the verbs
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "catseye needs Python 3.11 or newer, this is " + sys.version.split()[0])'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,web,pdf]'
 	@touch $@
 
 setup: $(STAMP)  ## make .venv and install catseye in it
@@ -34,10 +34,30 @@ test: style  ## check, and the tests: types beside them, as a core is idle now a
 	$(MAKE) --no-print-directory --jobs 2 types tests
 
 test-all: style  ## the same with the long scatter and fault runs
-	$(MAKE) --no-print-directory --jobs 2 types tests TESTS="-m 'slow or not slow' --hypothesis-profile=explore --timeout=7200"
+	$(MAKE) --no-print-directory --jobs 2 types tests TESTS="-m 'not browser' --hypothesis-profile=explore --timeout=7200"
 
 tests: setup
 	$(PYTEST) $(TESTS)
+
+test-web: setup  ## pages in a browser, and the front end built again: wants Node 20.19 and Chromium, says what it lacks
+	$(BIN)/python tests/browser/prerequisites.py || exit 0; \
+	$(MAKE) --no-print-directory front-check && \
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test-web]' && \
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m browser tests/browser
+
+front/node_modules: front/package-lock.json
+	cd front && npm ci --silent
+	@touch $@
+
+front: front/node_modules  ## the dashboard and the reports' script, from front/ into the package: wants Node
+	cd front && npm run --silent build
+
+front-check: front/node_modules  # types, and the committed files against a new build, byte by byte
+	cd front && npm run --silent check && npm test --silent
+	cd front && rm -rf built && npx vite build --logLevel warn --outDir built/web && \
+	npx vite build --config vite.report.config.ts --logLevel warn --outDir built/report
+	diff -r front/built/web src/catseye/web/static
+	diff -r front/built/report src/catseye/gateways/writers/static
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
@@ -58,4 +78,4 @@ release: setup  ## a wheel in dist/
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 
 clean:  ## remove .venv and everything that can be made again
-	rm -rf .venv dist demo-night-01 .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv dist demo-night-01 front/node_modules front/built .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
