@@ -1,116 +1,28 @@
-"""A living site with its page, a browser, and what every page must keep to."""
+"""A living site with its page, and a browser."""
 
 import json
 import signal
-import socket
-import subprocess
-import sys
 import time
-import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
-from pathlib import Path
 
 import pytest
 
 from browser.prerequisites import browser, missing
-from process_scene import ends_with_us
+from browser.scene import START_MJD, TOKEN, WIDTHS, LivingSite, Part, Watched, free_port, wait_for
 
 FLAGS = (
     *("--no-sandbox", "--disable-background-networking", "--disable-component-update", "--disable-sync"),
     *("--disable-quic", "--enable-unsafe-swiftshader"),
 )
-ROOT = Path(__file__).parents[2]
-AXE = ROOT / "front" / "node_modules" / "axe-core" / "axe.min.js"
-LONGEST_START = 90.0  # s, beside other work
-START_MJD = 60635.125  # 2024-11-21, 03:00 UTC
-TOKEN = "a-token-of-the-tests-0123456789abcdef"
-WIDTHS = {"laptop": (1440, 900), "phone": (390, 844)}
 
 
 def pytest_collection_modifyitems(items):
     lacks = missing()
     for item in items:
-        item.add_marker(pytest.mark.browser)
-        if lacks:
-            item.add_marker(pytest.mark.skip(reason=f"browser tests: {'; '.join(lacks)}"))
-
-
-@dataclass
-class Part:
-    """A process of the site, which a test may freeze, kill and start again.
-
-    module       of Python that is run, and its arguments
-    first_line   sent to its standard input, which stays open
-    """
-
-    module: tuple[str, ...]
-    log: Path
-    first_line: str = ""
-    process: subprocess.Popen | None = None
-
-    def start(self) -> str:
-        """Start it and return the first line of its standard output."""
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", *self.module],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self.log.open("a"),
-            text=True,
-            preexec_fn=ends_with_us(),
-        )
-        if self.first_line:
-            self.process.stdin.write(self.first_line + "\n")
-            self.process.stdin.flush()
-        return self.process.stdout.readline()
-
-    def kill(self, number: int = signal.SIGKILL) -> None:
-        """End it by a signal, frozen or not."""
-        with suppress(ProcessLookupError):
-            self.process.send_signal(number)
-            self.process.send_signal(signal.SIGCONT)
-        self.process.wait(15.0)
-
-    @contextmanager
-    def frozen(self) -> Iterator[None]:
-        self.process.send_signal(signal.SIGSTOP)
-        try:
-            yield
-        finally:
-            self.process.send_signal(signal.SIGCONT)
-
-
-@dataclass
-class LivingSite:
-    """A twin, its coordinator and the service of its pages, a process each."""
-
-    twin: Part
-    coordinator: Part
-    service: Part
-    port: int  # of the coordinator
-    journal: Path
-    url: str = ""
-
-    def get(self, path: str) -> dict:
-        """Answer of the service, which the pages must show."""
-        with urllib.request.urlopen(f"{self.url}/api/{path}", timeout=20.0) as reply:
-            return json.load(reply)
-
-
-def free_port() -> int:
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
-
-
-def wait_for(done, seconds: float = LONGEST_START):
-    """What `done` returns once it is true."""
-    until = time.monotonic() + seconds
-    while not (value := done()):
-        assert time.monotonic() < until, f"nothing after {seconds:g} s"
-        time.sleep(0.1)
-    return value
+        if "browser" in item.path.parent.name:
+            item.add_marker(pytest.mark.browser)
+            if lacks:
+                item.add_marker(pytest.mark.skip(reason=f"browser tests: {'; '.join(lacks)}"))
 
 
 @pytest.fixture(scope="session")
@@ -125,7 +37,8 @@ def site(tmp_path_factory) -> Iterator[LivingSite]:
         ),
         where / "twin.log",
     )
-    at = json.loads(twin.start())
+    twin.start()
+    at = twin.addresses()
     feed_host, feed_port = at["feed"]
     rangers = "".join(
         f'[[ranger]]\nname = "{name}"\nhost = "{host}"\nports = [{first}, {second}]\n'
@@ -161,8 +74,9 @@ def site(tmp_path_factory) -> Iterator[LivingSite]:
     )
     parts = (living.service, living.coordinator, living.twin)
     try:
-        start_coordinator(living)
-        host, page_port = json.loads(living.service.start())["listening"]
+        living.start_coordinator()
+        living.service.start()
+        host, page_port = living.service.addresses()["listening"]
         living.url = f"http://{host}:{page_port}"
         wait_for(lambda: living.get("state")["epoch"])
         yield living
@@ -170,25 +84,6 @@ def site(tmp_path_factory) -> Iterator[LivingSite]:
         for part in parts:
             if part.process is not None:
                 part.kill(signal.SIGTERM)
-
-
-def start_coordinator(site: LivingSite) -> None:
-    """Start the coordinator and wait until its port listens."""
-    part = site.coordinator
-    part.process = subprocess.Popen(
-        [sys.executable, "-P", "-m", *part.module],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=part.log.open("a"),
-        preexec_fn=ends_with_us(),
-    )
-
-    def listens() -> bool:
-        with suppress(OSError), socket.create_connection(("127.0.0.1", site.port), 1.0):
-            return True
-        return False
-
-    wait_for(listens)
 
 
 @pytest.fixture(scope="session")
@@ -199,33 +94,6 @@ def chromium():
         opened = started.chromium.launch(executable_path=browser(), args=list(FLAGS))
         yield opened
         opened.close()
-
-
-@dataclass
-class Watched:
-    """A page, with its errors and its requests to anywhere else."""
-
-    page: object
-    errors: list[str] = field(default_factory=list)
-    elsewhere: list[str] = field(default_factory=list)
-
-    def assert_clean(self) -> None:
-        assert self.errors == []
-        assert self.elsewhere == []
-
-    def axe(self) -> list[str]:
-        """Serious and critical findings of axe-core."""
-        self.page.evaluate(AXE.read_text())
-        found = self.page.evaluate("axe.run()")["violations"]
-        return [
-            f"{each['id']}: {each['nodes'][0]['html'][:200]}"
-            for each in found
-            if each["impact"] in ("serious", "critical")
-        ]
-
-    def too_wide(self) -> int:
-        """Pixels by which the page scrolls sideways."""
-        return self.page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
 
 
 @pytest.fixture
