@@ -82,7 +82,7 @@ def site(tmp_path_factory) -> Iterator[LivingSite]:
         yield living
     finally:
         for part in parts:
-            if part.process is not None:
+            if part.process is not None and part.process.returncode is None:
                 part.kill(signal.SIGTERM)
 
 

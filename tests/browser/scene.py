@@ -38,14 +38,15 @@ class Part:
     process: subprocess.Popen | None = None
 
     def start(self) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", *self.module],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self.log.open("a"),
-            text=True,
-            preexec_fn=ends_with_us(),
-        )
+        with self.log.open("a") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-m", *self.module],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                preexec_fn=ends_with_us(),
+            )
         if self.first_line:
             self.process.stdin.write(self.first_line + "\n")
             self.process.stdin.flush()
@@ -60,6 +61,8 @@ class Part:
             self.process.send_signal(number)
             self.process.send_signal(signal.SIGCONT)
         self.process.wait(15.0)
+        self.process.stdin.close()
+        self.process.stdout.close()
 
     @contextmanager
     def frozen(self) -> Iterator[None]:
