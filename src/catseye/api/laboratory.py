@@ -3,12 +3,14 @@
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from catseye.aliases import Progress
+from catseye.api.certificates import CertificateIssue, certificate_records, issue_of
 from catseye.api.reading import place_of
 from catseye.api.result import Result, SinglePage, digest_of, quantities
 from catseye.constants import MILLIMETRE
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
+    from catseye.gateways.calibrations.certificate import CertifiedSubject
     from catseye.gateways.writers.passage import Passage
     from catseye.reduction.calibrations.calibration import Calibration
     from catseye.reduction.calibrations.field_report import Report
@@ -34,6 +37,7 @@ class CalibrationResult(Result):
     covariance    (q, q) in those units
     record        what can be copied into the record of the instrument
     calibration   everything else: residuals, tests, figure, provenance
+    issue         laboratory and job of its certificate, with statements of conformity
     read          files that were read
     """
 
@@ -44,14 +48,15 @@ class CalibrationResult(Result):
     covariance: np.ndarray
     record: dict[str, Any]
     calibration: "Calibration"
+    issue: "CertificateIssue"
     read: tuple[Path, ...]
 
     def passages(self) -> "Sequence[Passage]":
-        """Quantity, result, tests and readings."""
-        from catseye.gateways.calibrations.certificate import passages
+        """Quantity, result, conformity, tests and readings."""
+        from catseye.gateways.calibrations.summary import passages
         from catseye.gateways.writers.passage import Passage
 
-        return [Passage(title, text) for title, text in passages(self.calibration)]
+        return [*(Passage(title, text) for title, text in passages(self.calibration)), *self.issue.passages()]
 
     def headline(self) -> "Sequence[Passage]":
         """The calibration and what was found."""
@@ -87,28 +92,36 @@ class CalibrationResult(Result):
         return {"readings": calibration_figure(self.calibration)}
 
     def pages(self) -> dict[str, SinglePage]:
-        """`record`, to keep with the instrument's; `certificate`, a page to sign."""
-        from catseye.gateways.calibrations.certificate import MARK as PAGE_MARK
-        from catseye.gateways.calibrations.certificate import certificate as drawn
+        """`record`, to keep with the instrument's; `certificate`, to sign, PDF or HTML by its name."""
         from catseye.gateways.calibrations.certificate_record import MARK, calibration_toml
 
         return {
             "record": SinglePage(MARK, lambda now, path: calibration_toml(self.calibration)),
-            "certificate": SinglePage(PAGE_MARK, lambda now, path: drawn(self.calibration, now), html=True),
+            "certificate": self.issue.page(self._subject),
         }
 
+    def _subject(self) -> "CertifiedSubject":
+        from catseye.gateways.calibrations.calibration_certificate import calibration_subject
+
+        return calibration_subject(self.calibration)
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Write record.toml and certificate.html with tables, figure and JSON."""
+        """Write record.toml and certificate.html with tables, figure and JSON.
+
+        Raises InputError where another certificate of this number is beside the directory or in a folder there.
+        """
+        if (refuse := self.issue.page(self._subject, folders=True).refuse) is not None:
+            refuse(datetime.now(UTC), directory)
         self.write_files(
             directory, progress, self.page_texts({"record.toml": "record", "certificate.html": "certificate"})
         )
 
     def inputs(self) -> dict[str, str]:
-        """SHA-256 of the readings and of their sheet."""
+        """SHA-256 of the files that were read."""
         return {path.name: digest_of(path) for path in self.read if path.is_file()}
 
     def sources(self) -> tuple[Path, ...]:
-        """The readings and their sheet."""
+        """The readings and their sheet, the laboratory's record and the job."""
         return self.read
 
 
@@ -118,6 +131,8 @@ def calibrate(
     sheet: "str | os.PathLike[str] | None" = None,
     *,
     reject: bool = False,
+    laboratory: "str | os.PathLike[str] | None" = None,
+    job: "str | os.PathLike[str] | None" = None,
 ) -> CalibrationResult:
     """Calibration from a table of readings: quantities with covariance and tests.
 
@@ -125,6 +140,7 @@ def calibrate(
     readings   table (docs/formats/calibrations.md)
     sheet      who, when, with what; the file beside the table with the ending .toml without
     reject     leave out readings that the tests reject, one by one
+    laboratory, job   who issues the certificate, for whom and how (docs/formats/certificates.md)
 
     A calibration whose tests fail is a result, too: its verdict is "failed" and its values stand.
     Raises InputError for an unknown kind and for files that cannot be used.
@@ -136,6 +152,7 @@ def calibrate(
 
     table = place_of(readings)
     beside = None if sheet is None else place_of(sheet)
+    records = certificate_records(laboratory, job)
     found = calibrated(kind, table, beside, reject=reject)
     return CalibrationResult(
         verdict=found.verdict,
@@ -146,7 +163,8 @@ def calibrate(
         covariance=np.asarray(found.covariance),
         record=dict(found.record),
         calibration=found,
-        read=(table, table.with_suffix(".toml") if beside is None else beside),
+        issue=issue_of(found.quantities, records),
+        read=(table, table.with_suffix(".toml") if beside is None else beside, *records.read),
     )
 
 
@@ -158,6 +176,7 @@ class CertificateResult(Result):
     keys      of the fields in the record
     missing   keys of the fields that the record lacks
     report    every field with its value, u and unit; provenance
+    issue     laboratory and job of its certificate, with statements of conformity
     read      file that was read; None: a blank form
     page      file that was written; None: none
     """
@@ -166,14 +185,15 @@ class CertificateResult(Result):
     keys: tuple[str, ...]
     missing: tuple[str, ...]
     report: "Report"
+    issue: "CertificateIssue"
     read: Path | None
     page: Path | None = None
 
     def passages(self) -> "Sequence[Passage]":
-        """Title and number of the report, and the missing fields."""
+        """Title and number of the report, the missing fields, and conformity."""
         from catseye.gateways.calibrations.field_report_fields import report_passages
 
-        return report_passages(self.report)
+        return [*report_passages(self.report), *self.issue.passages()]
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye certificate --json`."""
@@ -194,20 +214,30 @@ class CertificateResult(Result):
         return {"fields": quantities(columns)}
 
     def pages(self) -> dict[str, SinglePage]:
-        """`page`: the report, to print and sign."""
+        """`page`: the notes' form; `certificate`: a calibration certificate, PDF or HTML by its name."""
         from catseye.gateways.calibrations.field_report import field_report, mark
 
-        return {"page": SinglePage(mark(self.kind), lambda now, path: field_report(self.report, now), html=True)}
+        page = SinglePage(mark(self.kind), lambda now, path: field_report(self.report, now), html=True)
+        return {"page": page, "certificate": self.issue.page(self._subject)}
 
-    def save_page(self, path: "str | os.PathLike[str]") -> "CertificateResult":
-        """Write the report, to print and sign.
+    def _subject(self) -> "CertifiedSubject":
+        from catseye.gateways.calibrations.field_certificate import report_subject
 
-        path   new, or an earlier page of catseye; its name ends in .html
+        return report_subject(self.report)
+
+    def save_page(
+        self, path: "str | os.PathLike[str] | None", certificate: "str | os.PathLike[str] | None" = None
+    ) -> "CertificateResult":
+        """Write the report and the certificate, to print and sign, both or none.
+
+        path          of the report: new, or an earlier page of catseye; its name ends in .html; None: not written
+        certificate   of the certificate, .pdf or .html; None: not written
 
         Returns the result with the name of its page. Raises InputError where nothing can be written.
         """
-        self.save_pages(page=Path(path))
-        return replace(self, page=Path(path))
+        page = None if path is None else Path(path)
+        self.save_pages(page=page, certificate=None if certificate is None else Path(certificate))
+        return replace(self, page=page)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write certificate.html with table and JSON."""
@@ -218,16 +248,24 @@ class CertificateResult(Result):
         return {self.report.file: self.report.sha256} if self.report.file else {}
 
     def sources(self) -> tuple[Path, ...]:
-        """Record that fills the form."""
-        return () if self.read is None else (self.read,)
+        """Record that fills the form, the laboratory's record and the job."""
+        return (*(() if self.read is None else (self.read,)), *self.issue.records.read)
 
 
-def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, blank: bool = False) -> CertificateResult:
+def certificate(
+    kind: str,
+    record: "str | os.PathLike[str] | None" = None,
+    *,
+    blank: bool = False,
+    laboratory: "str | os.PathLike[str] | None" = None,
+    job: "str | os.PathLike[str] | None" = None,
+) -> CertificateResult:
     """Calibration report of a monument or a mirror, filled or blank.
 
     kind     "monument" or "mirror"
     record   record that fills it; None: a blank form
     blank    a blank form, for which there is no record
+    laboratory, job   who issues the certificate, for whom and how (docs/formats/certificates.md)
 
     Raises InputError for a record that cannot be used; ArgumentError: an unknown kind, a blank form with a record.
 
@@ -241,6 +279,7 @@ def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, bl
     if blank and record is not None:
         raise ArgumentError("blank takes no record", "blank")
     path = None if record is None else place_of(record)
+    records = certificate_records(laboratory, job)
     report = blank_report(kind) if path is None else read_report(kind, path)
     return CertificateResult(
         verdict=report.verdict,
@@ -248,6 +287,7 @@ def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, bl
         keys=tuple(each.entry.key for each in report.fields),
         missing=tuple(entry.key for entry in report.missing),
         report=report,
+        issue=issue_of(report.quantities, records),
         read=path,
     )
 

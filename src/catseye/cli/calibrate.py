@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.commands import Job, Json, Laboratory, Quiet, app
 from catseye.cli.results import Strict, tell
 from catseye.cli.vocabularies import CALIBRATION_KINDS, one_of
 
@@ -36,8 +36,10 @@ def calibrate(  # noqa: PLR0913 - its options are its command line
     ] = None,
     certificate: Annotated[
         Path | None,
-        typer.Option("--certificate", metavar="PAGE.html", help="Page to sign: new, or an earlier one."),
+        typer.Option("--certificate", metavar="FILE.pdf", help="Certificate to sign, .pdf or .html."),
     ] = None,
+    laboratory: Laboratory = None,
+    job: Job = None,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,
@@ -46,8 +48,9 @@ def calibrate(  # noqa: PLR0913 - its options are its command line
     from catseye.api.laboratory import calibrate as calibrated
     from catseye.api.result import require_writable
 
-    require_writable(None, readings, sheet or readings.with_suffix(".toml"), record=write, certificate=certificate)
-    result = calibrated(kind, readings, sheet, reject=reject)
+    read = (readings, sheet or readings.with_suffix(".toml"), laboratory, job)
+    require_writable(None, *read, record=write, certificate=certificate)
+    result = calibrated(kind, readings, sheet, reject=reject, laboratory=laboratory, job=job)
     result.save_pages(record=write, certificate=certificate)
     written = [("Record", write), ("Certificate", certificate)]
     tell(result, json=json, quiet=quiet, strict=strict, written=written)

@@ -114,6 +114,14 @@ Threads = Annotated[
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]
+Laboratory = Annotated[
+    Path | None,
+    typer.Option("--laboratory", metavar="LAB.toml", help="Laboratory of the certificate."),
+]
+Job = Annotated[
+    Path | None,
+    typer.Option("--job", metavar="JOB.toml", help="Number, customer, limits of the certificate."),
+]
 
 
 @app.callback(

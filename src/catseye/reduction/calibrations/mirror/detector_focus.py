@@ -204,9 +204,8 @@ def _results(solution: CurvedFit, model: Model, coupled: bool) -> tuple[tuple[Qu
         )
     turn = np.column_stack(slopes)[: len(keys)]
     covariance = turn @ solution.covariance @ turn.T
-    sought = [k for k, p in enumerate(solution.parameters) if np.isinf(p.u)]
     values = _derived(solution.values, model)[: len(keys)]
-    return quantities(keys, values, covariance, fit=solution.fit, turn=turn[:, sought]), covariance
+    return quantities(keys, values, covariance, fit=solution.fit, turn=turn[:, solution.uncertain]), covariance
 
 
 def _calibration(readings: SheetReadings, solution: CurvedFit, model: Model, longer: CurvedFit | None) -> Calibration:

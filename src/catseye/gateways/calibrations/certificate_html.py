@@ -1,0 +1,125 @@
+"""Certificate as a page: one self-contained HTML file, to read, print and sign."""
+
+import base64
+from html import escape
+
+from catseye.gateways.calibrations.document import (
+    NOT_STATED,
+    Block,
+    CertificateDocument,
+    Chapter,
+    Drawing,
+    Facts,
+    Grid,
+    Letterhead,
+    Listing,
+    Paragraph,
+)
+from catseye.gateways.writers.page import page, paragraph, picture, section, table
+from catseye.gateways.writers.verdict import verdict_line
+
+PNG = b"\x89PNG"
+STYLE = """
+.letter { display: flex; gap: 1.2rem; align-items: center; border-bottom: 3px solid var(--accent);
+  padding-bottom: .7rem; }
+.letter img { max-height: 4.4rem; max-width: 14rem; } .letter div { flex: 1; font-size: .86rem; line-height: 1.35; }
+.letter b { font-size: 1.05rem; } .letter .accreditation { text-align: right; flex: 0 1 16rem; }
+h1 { margin: 1.2rem 0 0; overflow-wrap: anywhere; }
+dl.facts { grid-template-columns: max-content 1fr max-content 1fr; gap: .15rem .9rem; font-size: .88rem; }
+dl.facts dt { font-weight: 400; color: var(--faint); } dl.facts dd { overflow-wrap: anywhere; }
+.scroll { max-height: none; } .block { margin: 1.1rem 0 0; font-weight: 600; font-size: .9rem; }
+td, th { overflow-wrap: anywhere; } td.n, th.n { overflow-wrap: normal; }
+pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--soft); padding: .6rem .9rem; }
+.sign { display: grid; grid-template-columns: repeat(3, 1fr); gap: 2.4rem 2rem; margin: 3.2rem 0 1rem; }
+.sign div { border-top: 1px solid var(--ink); padding-top: .3rem; font-size: .85rem; color: var(--faint);
+  overflow-wrap: anywhere; }
+.sign b { display: block; color: var(--ink); }
+@media (max-width: 40rem) { dl.facts { grid-template-columns: max-content 1fr; }
+  .sign { grid-template-columns: 1fr; } .letter { flex-wrap: wrap; } }
+@media print { .sign { break-inside: avoid; break-before: avoid; } .scroll { break-inside: auto; }
+  td.w { min-width: 0; } th, td { padding: .2rem .35rem; } thead { display: table-header-group; }
+  table { font-size: 7.4pt; table-layout: auto; } section { break-inside: auto; } dl.facts { font-size: 8.2pt; }
+  td.h { font-size: 6.6pt; } h1 { font-size: 17pt; } h2 { font-size: 12pt; margin-top: 1.4rem; }
+  p { max-width: none; } * { print-color-adjust: exact; } }
+"""
+
+
+def certificate_html(document: CertificateDocument) -> str:
+    """HTML page of a certificate."""
+    body = [
+        f"<style>{STYLE}{_page_style(document)}</style>",
+        _letterhead(document.letterhead),
+        f"<h1>{escape(document.heading)}</h1>",
+        f'<p class="faint">{escape(document.subject)}</p>',
+        verdict_line(document.verdict),
+        _block(document.facts),
+        _chapter(document.results),
+        _signatures(document.signatures),
+        *(_chapter(chapter) for chapter in document.chapters),
+    ]
+    text = page(f"{document.heading}: {document.subject}", "\n".join(body))
+    return text.replace("<head>\n", f"<head>\n<!-- {' '.join(document.marks)} -->\n", 1)
+
+
+def _page_style(document: CertificateDocument) -> str:
+    """Margins of the printed page, with the number and the page in its foot."""
+    return (
+        "@page { size: A4; margin: 16mm 14mm 18mm; "
+        f"@bottom-left {{ content: {_css_text(document.heading)}; font: 7.5pt sans-serif; color: #6b7883; }} "
+        '@bottom-right { content: "page " counter(page) " of " counter(pages); font: 7.5pt sans-serif; '
+        "color: #6b7883; } }"
+    )
+
+
+def _css_text(text: str) -> str:
+    """CSS string of any text, every odd character as its number.
+
+    >>> _css_text('a</b>')
+    '"a\\\\00003c\\\\00002fb\\\\00003e"'
+    """
+    return '"' + "".join(c if (c.isalnum() and c.isascii()) or c == " " else f"\\{ord(c):06x}" for c in text) + '"'
+
+
+def _letterhead(letterhead: Letterhead) -> str:
+    logo = ""
+    if letterhead.logo:
+        kind = "image/png" if letterhead.logo.startswith(PNG) else "image/svg+xml"
+        source = base64.b64encode(letterhead.logo).decode()
+        logo = f'<img src="data:{kind};base64,{source}" alt="{escape(letterhead.name, quote=True)}">'
+    lines = "<br>".join(escape(line) for line in letterhead.lines)
+    return (
+        f'<header class="letter">{logo}<div><b>{escape(letterhead.name)}</b><br>{lines}</div>'
+        f'<div class="accreditation">accreditation<br>{escape(letterhead.accreditation)}</div></header>'
+    )
+
+
+def _signatures(signatures: tuple[tuple[str, str], ...]) -> str:
+    lines = "".join(
+        f"<div>{f'<b>{escape(name)}</b>' if name else ''}{escape(role)}, date, signature</div>"
+        for role, name in signatures
+    )
+    return f'<div class="sign">{lines}</div>'
+
+
+def _chapter(chapter: Chapter) -> str:
+    return section(chapter.key, chapter.title, *(_block(block) for block in chapter.blocks))
+
+
+def _block(block: Block) -> str:
+    match block:
+        case Facts():
+            rows = "".join(
+                f"<dt>{escape(name)}</dt><dd{' class=faint' if text == NOT_STATED else ''}>{escape(text)}</dd>"
+                for name, text in block.rows
+            )
+            return f'<dl class="facts">{rows}</dl>'
+        case Paragraph():
+            return paragraph(block.text, "faint" if block.faint else "")
+        case Grid():
+            caption = f'<p class="block">{escape(block.caption)}</p>' if block.caption else ""
+            return caption + table(block.columns, block.rows, block.kinds)
+        case Drawing():
+            return picture(block.svg, block.caption)
+        case Listing():
+            lines = escape("\n".join(block.lines))
+            return f'<p class="block">{escape(block.caption)}</p><pre>{lines}</pre>'
