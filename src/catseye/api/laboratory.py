@@ -4,13 +4,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from catseye.aliases import Progress
-from catseye.api.certificates import CertificateIssue, certificate_records, issue_of
 from catseye.api.reading import place_of
 from catseye.api.result import Result, SinglePage, digest_of, quantities
 from catseye.constants import MILLIMETRE
@@ -20,11 +20,26 @@ if TYPE_CHECKING:
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
-    from catseye.gateways.calibrations.certificate import CertifiedSubject
+    from catseye.gateways.certificates.file import CertificateFile
     from catseye.gateways.writers.passage import Passage
     from catseye.reduction.calibrations.calibration import Calibration
+    from catseye.reduction.calibrations.conformity import CertificateIssue
     from catseye.reduction.calibrations.field_report import Report
     from catseye.reduction.triplet.result import TripletReduction
+
+
+def certificate_page(file: "CertificateFile") -> SinglePage:
+    """Certificate as a single file of a result, PDF or HTML by its name."""
+    from catseye.gateways.certificates.document import MARK
+
+    return SinglePage(MARK, file.content, html=True, pdf=True, refuse=file.refuse)
+
+
+def certificate_places(
+    laboratory: "str | os.PathLike[str] | None", job: "str | os.PathLike[str] | None"
+) -> tuple[Path | None, Path | None]:
+    """Places of a certificate's two records, examples by name; None: not stated."""
+    return None if laboratory is None else place_of(laboratory), None if job is None else place_of(job)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,10 +68,11 @@ class CalibrationResult(Result):
 
     def passages(self) -> "Sequence[Passage]":
         """Quantity, result, conformity, tests and readings."""
-        from catseye.gateways.calibrations.summary import passages
+        from catseye.gateways.calibrations.summary import conformity_passages, passages
         from catseye.gateways.writers.passage import Passage
 
-        return [*(Passage(title, text) for title, text in passages(self.calibration)), *self.issue.passages()]
+        of_calibration = [Passage(title, text) for title, text in passages(self.calibration)]
+        return [*of_calibration, *conformity_passages(self.issue.conformities)]
 
     def headline(self) -> "Sequence[Passage]":
         """The calibration and what was found."""
@@ -97,21 +113,21 @@ class CalibrationResult(Result):
 
         return {
             "record": SinglePage(MARK, lambda now, path: calibration_toml(self.calibration)),
-            "certificate": self.issue.page(self._subject),
+            "certificate": certificate_page(self._certificate()),
         }
 
-    def _subject(self) -> "CertifiedSubject":
+    def _certificate(self) -> "CertificateFile":
         from catseye.gateways.calibrations.calibration_certificate import calibration_subject
+        from catseye.gateways.certificates.file import CertificateFile
 
-        return calibration_subject(self.calibration)
+        return CertificateFile(partial(calibration_subject, self.calibration), self.issue)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write record.toml and certificate.html with tables, figure and JSON.
 
         Raises InputError where another certificate of this number is beside the directory or in a folder there.
         """
-        if (refuse := self.issue.page(self._subject, folders=True).refuse) is not None:
-            refuse(datetime.now(UTC), directory)
+        self._certificate().refuse_beside(datetime.now(UTC), directory)
         self.write_files(
             directory, progress, self.page_texts({"record.toml": "record", "certificate.html": "certificate"})
         )
@@ -148,12 +164,13 @@ def calibrate(
     >>> calibrate("linearity", "calibrations/linearity.csv").kind
     'linearity'
     """
+    from catseye.reduction.calibrations.conformity import certificate_issue
     from catseye.reduction.calibrations.kinds import calibrate as calibrated
 
     table = place_of(readings)
     beside = None if sheet is None else place_of(sheet)
-    records = certificate_records(laboratory, job)
     found = calibrated(kind, table, beside, reject=reject)
+    issue = certificate_issue(found.quantities, *certificate_places(laboratory, job))
     return CalibrationResult(
         verdict=found.verdict,
         kind=found.kind,
@@ -163,8 +180,8 @@ def calibrate(
         covariance=np.asarray(found.covariance),
         record=dict(found.record),
         calibration=found,
-        issue=issue_of(found.quantities, records),
-        read=(table, table.with_suffix(".toml") if beside is None else beside, *records.read),
+        issue=issue,
+        read=(table, table.with_suffix(".toml") if beside is None else beside, *issue.records.read),
     )
 
 
@@ -192,8 +209,9 @@ class CertificateResult(Result):
     def passages(self) -> "Sequence[Passage]":
         """Title and number of the report, the missing fields, and conformity."""
         from catseye.gateways.calibrations.field_report_fields import report_passages
+        from catseye.gateways.calibrations.summary import conformity_passages
 
-        return [*report_passages(self.report), *self.issue.passages()]
+        return [*report_passages(self.report), *conformity_passages(self.issue.conformities)]
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye certificate --json`."""
@@ -218,12 +236,13 @@ class CertificateResult(Result):
         from catseye.gateways.calibrations.field_report import field_report, mark
 
         page = SinglePage(mark(self.kind), lambda now, path: field_report(self.report, now), html=True)
-        return {"page": page, "certificate": self.issue.page(self._subject)}
+        return {"page": page, "certificate": certificate_page(self._certificate())}
 
-    def _subject(self) -> "CertifiedSubject":
+    def _certificate(self) -> "CertificateFile":
         from catseye.gateways.calibrations.field_certificate import report_subject
+        from catseye.gateways.certificates.file import CertificateFile
 
-        return report_subject(self.report)
+        return CertificateFile(partial(report_subject, self.report), self.issue)
 
     def save_page(
         self, path: "str | os.PathLike[str] | None", certificate: "str | os.PathLike[str] | None" = None
@@ -272,6 +291,7 @@ def certificate(
     >>> certificate("monument", "monuments/ZY3.toml").missing[:2]
     ('measured_on', 'by')
     """
+    from catseye.reduction.calibrations.conformity import certificate_issue
     from catseye.reduction.calibrations.field_report import FORMS, blank_report, read_report
 
     if kind not in FORMS:
@@ -279,7 +299,6 @@ def certificate(
     if blank and record is not None:
         raise ArgumentError("blank takes no record", "blank")
     path = None if record is None else place_of(record)
-    records = certificate_records(laboratory, job)
     report = blank_report(kind) if path is None else read_report(kind, path)
     return CertificateResult(
         verdict=report.verdict,
@@ -287,7 +306,7 @@ def certificate(
         keys=tuple(each.entry.key for each in report.fields),
         missing=tuple(entry.key for entry in report.missing),
         report=report,
-        issue=issue_of(report.quantities, records),
+        issue=certificate_issue(report.quantities, *certificate_places(laboratory, job)),
         read=path,
     )
 

@@ -11,11 +11,11 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.gateways.calibrations.calibration_certificate import _cell, _form, calibration_subject
-from catseye.gateways.calibrations.certificate import certificate_document
-from catseye.gateways.calibrations.certificate_html import certificate_html
 from catseye.gateways.calibrations.certificate_record import MARK, QUANTITY, calibration_object, calibration_toml
-from catseye.gateways.calibrations.rounding import rounded_result
 from catseye.gateways.calibrations.summary import rounded
+from catseye.gateways.certificates.page import certificate_html
+from catseye.gateways.certificates.rounding import rounded_result
+from catseye.gateways.certificates.statement import certificate_document
 from catseye.gateways.writers.objects import json_line
 from catseye.records.files.reading import read_record
 from catseye.records.laboratory.calibration import CalibrationRecord

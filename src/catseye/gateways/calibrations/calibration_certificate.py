@@ -3,10 +3,10 @@
 import math
 from typing import Any, cast
 
-from catseye.gateways.calibrations.certificate import CertifiedSubject
 from catseye.gateways.calibrations.certificate_figure import calibration_figure
 from catseye.gateways.calibrations.certificate_record import record_lines
-from catseye.gateways.calibrations.document import Block, Chapter, Drawing, Grid, Listing, Paragraph
+from catseye.gateways.certificates.document import Block, CellTable, Chapter, Listing, Paragraph, SvgPicture
+from catseye.gateways.certificates.statement import CertifiedSubject
 from catseye.gateways.writers.drawing import svg
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
@@ -47,10 +47,10 @@ def _tests(calibration: Calibration) -> Chapter:
     return Chapter("tests", "Tests of the readings", (Paragraph(degrees), outcomes, *notes))
 
 
-def tests_grid(outcomes: tuple[CheckOutcome, ...]) -> Grid:
+def tests_grid(outcomes: tuple[CheckOutcome, ...]) -> CellTable:
     """Tests with value, limit and outcome."""
     rows = tuple((o.name, _number(o.statistic, ".4g"), _limit(o), _outcome(o), o.text) for o in outcomes)
-    return Grid(("test", "value", "limit", "outcome", "what it means"), "wnntw", rows)
+    return CellTable(("test", "value", "limit", "outcome", "what it means"), "wnntw", rows)
 
 
 def _limit(decision: CheckOutcome) -> str:
@@ -64,14 +64,14 @@ def _outcome(decision: CheckOutcome) -> str:
 
 
 def _pictures(calibration: Calibration) -> tuple[Block, ...]:
-    return (Drawing(svg(calibration_figure(calibration)), calibration.title),)
+    return (SvgPicture(svg(calibration_figure(calibration)), calibration.title),)
 
 
 def _readings(calibration: Calibration) -> Chapter:
     kinds = "".join("t" if isinstance(cell, str) else "n" for cell in calibration.rows[0])
     forms = [_form(name) for name in calibration.columns]
     rows = tuple(tuple(_cell(cell, form) for cell, form in zip(row, forms, strict=True)) for row in calibration.rows)
-    return Chapter("readings", f"{len(rows)} readings", (Grid(calibration.columns, kinds, rows),))
+    return Chapter("readings", f"{len(rows)} readings", (CellTable(calibration.columns, kinds, rows),))
 
 
 def _to_copy(record: dict[str, Any]) -> tuple[Chapter, ...]:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from catseye.errors import InputError
-from catseye.gateways.calibrations.certificate import CertifiedSubject
-from catseye.gateways.calibrations.document import Chapter, Grid, Paragraph
 from catseye.gateways.calibrations.field_report_fields import written_aid, written_value
+from catseye.gateways.certificates.document import CellTable, Chapter, Paragraph
+from catseye.gateways.certificates.statement import CertifiedSubject
 from catseye.reduction.calibrations.field_report import FORMS, Report, ReportField
 
 UNCERTAINTIES = (
@@ -47,7 +47,7 @@ def _others(report: Report) -> Chapter:
     certified = {q.key for q in report.quantities}
     fields = [f for f in report.fields if f.value is not None and f.entry.key not in certified]
     rows = tuple((f.entry.name, f.entry.key, written_value(f), f.entry.unit, _remark(f)) for f in fields)
-    blocks: list[Grid | Paragraph] = [Grid(("field", "key", "value", "unit", "remark"), "wtttw", rows)]
+    blocks: list[CellTable | Paragraph] = [CellTable(("field", "key", "value", "unit", "remark"), "wtttw", rows)]
     if report.missing:
         names = ", ".join(entry.key for entry in report.missing)
         blocks.append(Paragraph(f"Missing in {report.file}: {names}."))

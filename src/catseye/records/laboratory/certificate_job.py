@@ -88,7 +88,7 @@ class Customer(Record):
 Span = Annotated[tuple[float, float], Field(strict=False)]
 
 
-class Environment(Record):
+class WorkEnvironment(Record):
     """Lowest and highest value during the work, and the standard uncertainty of each."""
 
     temperature_c: Span | None = None
@@ -192,7 +192,7 @@ class CertificateJob(Record):
     interval_agreed: bool = False
     decision_rule: DecisionRuleName | None = None
     customer: Customer | None = None
-    environment: Environment = Environment()
+    environment: WorkEnvironment = WorkEnvironment()
     reference: Annotated[tuple[ReferenceStandard, ...], Field(strict=False)] = ()
     specification: Annotated[tuple[Specification, ...], Field(strict=False)] = ()
 

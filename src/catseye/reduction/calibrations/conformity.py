@@ -2,10 +2,18 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from catseye.errors import InputError
-from catseye.records.laboratory.certificate_job import GUARDED, CertificateJob, DecisionRuleName, Specification
+from catseye.records.laboratory.certificate_job import (
+    GUARDED,
+    CertificateJob,
+    CertificateRecords,
+    DecisionRuleName,
+    Specification,
+    read_certificate_records,
+)
 from catseye.reduction.calibrations.calibration import Quantity
 
 Statement = Literal["pass", "conditional pass", "conditional fail", "fail"]
@@ -28,6 +36,34 @@ class Conformity:
     guard: float
     probability: float
     statement: Statement
+
+
+@dataclass(frozen=True, eq=False)
+class CertificateIssue:
+    """Laboratory and job of a certificate, with the statements that the job asks for.
+
+    records        laboratory, its logo and the job
+    conformities   with the job's specifications, in their order
+    """
+
+    records: CertificateRecords
+    conformities: tuple[Conformity, ...]
+
+
+def certificate_issue(
+    quantities: tuple[Quantity, ...], laboratory: Path | None = None, job: Path | None = None
+) -> CertificateIssue:
+    """Issue of a certificate of quantities, from its two records.
+
+    laboratory, job   files (docs/formats/certificates.md); None: not stated
+
+    Raises InputError for a file that cannot be used, and for a specification of a quantity that is none of them.
+    """
+    records = read_certificate_records(laboratory, job)
+    try:
+        return CertificateIssue(records, conformities(quantities, records.job))
+    except InputError as problem:
+        raise InputError(f"{job.name if job else 'job'}: {problem}") from problem
 
 
 def conformities(quantities: tuple[Quantity, ...], job: CertificateJob) -> tuple[Conformity, ...]:

@@ -7,24 +7,24 @@ from datetime import date, datetime
 
 import numpy as np
 
-from catseye.gateways.calibrations.document import (
+from catseye.gateways.certificates.document import (
     NOT_STATED,
     Block,
+    CellTable,
     CertificateDocument,
     Chapter,
     Facts,
-    Grid,
     Letterhead,
     Paragraph,
 )
-from catseye.gateways.calibrations.rounding import rounded_result, rounded_up
+from catseye.gateways.certificates.rounding import rounded_result, rounded_up
 from catseye.gateways.writers.objects import versions
 from catseye.records.laboratory.certificate_job import (
     CertificateJob,
     CertificateRecords,
-    Environment,
     LaboratoryRecord,
     Specification,
+    WorkEnvironment,
 )
 from catseye.reduction.calibrations.budget import COVERAGE, Contribution
 from catseye.reduction.calibrations.calibration import Quantity
@@ -187,7 +187,7 @@ def _results(subject: CertifiedSubject, conformities: Sequence[Conformity]) -> C
     judged_head = ("conformity",) if statements else ()
     heads = ("quantity", "value", "u", "k", "U = k u", "unit", *judged_head, "what it is, and which way it counts")
     blocks: list[Block] = [
-        Grid(heads, "tnnnnt" + "t" * bool(statements) + "w", tuple(rows)),
+        CellTable(heads, "tnnnnt" + "t" * bool(statements) + "w", tuple(rows)),
         Paragraph(UNCERTAINTY, faint=True),
         Paragraph(REPRODUCTION, faint=True),
     ]
@@ -222,7 +222,7 @@ def _work(subject: CertifiedSubject, job: CertificateJob) -> Chapter:
                     ("opinions and interpretations", stated(job.remarks)),
                 )
             ),
-            Grid(
+            CellTable(
                 ("environment during the work", "lowest", "highest", "u", "unit", "source"),
                 "tnnntt",
                 tuple(_conditions(subject, job.environment)),
@@ -232,7 +232,7 @@ def _work(subject: CertifiedSubject, job: CertificateJob) -> Chapter:
     )
 
 
-def _conditions(subject: CertifiedSubject, environment: Environment) -> Iterator[tuple[str, ...]]:
+def _conditions(subject: CertifiedSubject, environment: WorkEnvironment) -> Iterator[tuple[str, ...]]:
     """Conditions of the job, else those of the readings."""
     for key, (name, unit) in CONDITIONS.items():
         span, source = getattr(environment, key), "job"
@@ -262,9 +262,7 @@ def _traceability(records: CertificateRecords, measured_on: object) -> Chapter:
         for each in job.reference
     )
     heads = ("standard", "serial", "certificate", "laboratory", "calibrated on", "valid until", "traceability")
-    standards: Block = (
-        Grid(heads, "ttttttt", rows) if rows else Facts((("reference standards and their certificates", NOT_STATED),))
-    )
+    standards: Block = CellTable(heads, "ttttttt", rows) if rows else Facts((("reference standards", NOT_STATED),))
     return Chapter(
         "traceability",
         "Reference standards and traceability",
@@ -279,7 +277,7 @@ def _validity(valid_until: date | None, expired: bool) -> str:
 def _conventions(subject: CertifiedSubject) -> Chapter:
     blocks: tuple[Block, ...] = (Paragraph(CONVENTIONS),)
     if subject.conventions:
-        blocks = (*blocks, Grid(("quantity", "sense"), "tw", subject.conventions))
+        blocks = (*blocks, CellTable(("quantity", "sense"), "tw", subject.conventions))
     return Chapter("conventions", "Sign conventions", blocks)
 
 
@@ -300,7 +298,7 @@ def _budgets(quantities: Sequence[Quantity]) -> Iterator[Block]:
             f"{q.key}, in {q.unit or '1'}: u = {_readable(q.u, 4)}, ν_eff = {_degrees(q.degrees)}, "
             f"k = {q.coverage:.3f}, U = {expanded}"
         )
-        yield Grid(BUDGET_COLUMNS, "wntttnnnn", tuple(rows), caption)
+        yield CellTable(BUDGET_COLUMNS, "wntttnnnn", tuple(rows), caption)
     if unstated:
         yield Facts((("budget of " + ", ".join(unstated), NOT_STATED),))
 
@@ -346,7 +344,7 @@ def _correlations(subject: CertifiedSubject) -> Iterator[Chapter]:
     yield Chapter(
         "correlation",
         "Correlation of the results",
-        (Grid(("", *(str(j + 1) for j in range(count))), "t" + "n" * count, rows),),
+        (CellTable(("", *(str(j + 1) for j in range(count))), "t" + "n" * count, rows),),
     )
 
 
@@ -371,7 +369,7 @@ def _decision(job: CertificateJob, conformities: Sequence[Conformity]) -> Chapte
     blocks: tuple[Block, ...] = (Paragraph(RULES[job.decision_rule]),)
     if rows:
         text = "Probability that the true value lies within the limits, by the distribution of the result."
-        blocks = (*blocks, Grid(heads, "tnntnttt", rows), Paragraph(text, faint=True))
+        blocks = (*blocks, CellTable(heads, "tnntnttt", rows), Paragraph(text, faint=True))
     return Chapter("decision", "Decision rule and conformity", blocks)
 
 
@@ -391,9 +389,9 @@ def _probability(probability: float) -> str:
 def _provenance(subject: CertifiedSubject) -> Chapter:
     programs = tuple(versions().items())
     settings = tuple((key, str(value)) for key, value in subject.settings.items())
-    blocks: list[Block] = [Grid(("raw data", "SHA-256"), "th", tuple(subject.hashes.items()))]
+    blocks: list[Block] = [CellTable(("raw data", "SHA-256"), "th", tuple(subject.hashes.items()))]
     if settings:
-        blocks.append(Grid(("stated with the readings", "value"), "tw", settings))
-    blocks.append(Grid(("program", "version"), "tt", programs))
+        blocks.append(CellTable(("stated with the readings", "value"), "tw", settings))
+    blocks.append(CellTable(("program", "version"), "tt", programs))
     blocks.append(Paragraph("End of the certificate.", faint=True))
     return Chapter("provenance", "Raw data and software", tuple(blocks))

@@ -1,6 +1,7 @@
 """Certificate of calibration as a document: blocks of content, with no thought of HTML or PDF."""
 
 import hashlib
+import re
 from dataclasses import dataclass, fields
 from datetime import date
 from typing import NamedTuple
@@ -10,6 +11,8 @@ from catseye.verdict import Verdict
 TITLE = "Certificate of calibration"
 MARK = "catseye-certificate-1"  # identifies a file of catseye
 NOT_STATED = "not stated"
+BREAK = "\u200b"  # no width; a record cannot hold it
+LONG_WORD, PIECE = re.compile(r"\S{23,}"), re.compile(r"([^\s\u200b]{12})")
 
 
 class Facts(NamedTuple):
@@ -25,7 +28,7 @@ class Paragraph(NamedTuple):
     faint: bool = False
 
 
-class Grid(NamedTuple):
+class CellTable(NamedTuple):
     """Table whose head repeats on each page.
 
     columns   headings
@@ -40,7 +43,7 @@ class Grid(NamedTuple):
     caption: str = ""
 
 
-class Drawing(NamedTuple):
+class SvgPicture(NamedTuple):
     """Figure as SVG, its text as outlines."""
 
     svg: str
@@ -54,7 +57,7 @@ class Listing(NamedTuple):
     lines: tuple[str, ...]
 
 
-Block = Facts | Paragraph | Grid | Drawing | Listing
+Block = Facts | Paragraph | CellTable | SvgPicture | Listing
 
 
 class Chapter(NamedTuple):
@@ -118,6 +121,23 @@ class CertificateDocument:
     def marks(self) -> tuple[str, ...]:
         """Marks that identify the file as catseye's, its number and its content."""
         return tuple(filter(None, (MARK, self.number_mark, self.content_mark)))
+
+
+def breakable(text: str) -> str:
+    """Text with places (U+200B) where a word beyond 22 characters may break: after _, or each 12 characters.
+
+    >>> breakable("short_word"), breakable("x" * 24).count("\u200b")
+    ('short_word', 2)
+    """
+    return LONG_WORD.sub(lambda word: PIECE.sub(r"\1" + BREAK, word[0].replace("_", "_" + BREAK)), text)
+
+
+def cells_of(table: CellTable) -> list[list[str]]:
+    """Cells with places where a long word may break; a hash has none, so that it can be copied whole."""
+    return [
+        [cell if kind == "h" else breakable(cell) for cell, kind in zip(row, table.kinds, strict=True)]
+        for row in table.rows
+    ]
 
 
 def _hashed(name: str, text: str) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from catseye.errors import InputError
-from catseye.gateways.calibrations.document import CertificateDocument
+from catseye.gateways.certificates.document import CertificateDocument
 from catseye.gateways.writers.output import PAGES, holds
 
 SUFFIXES = (".pdf", *PAGES)

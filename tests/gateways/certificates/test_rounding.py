@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from catseye.gateways.calibrations.rounding import rounded_result, rounded_up
+from catseye.gateways.certificates.rounding import rounded_result, rounded_up
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,8 @@ import sys
 import pytest
 
 from catseye.errors import InputError
-from catseye.gateways.calibrations.certificate_pdf import certificate_pdf, typeset
-from catseye.gateways.calibrations.document import Grid
-from certificate_scene import HOSTILE, certified, document_of, hostile_document
+from catseye.gateways.certificates.document import CellTable
+from catseye.gateways.certificates.pdf import certificate_pdf, typeset
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -20,7 +19,7 @@ def typst():
     return pytest.importorskip("typst", reason="typst is not installed: the extra catseye[pdf]")
 
 
-def texts(typst, document, element):
+def texts(document, element):
     """Every text of an element of the typeset document, without the places where a word may break."""
     found = []
 
@@ -38,14 +37,13 @@ def texts(typst, document, element):
     return found
 
 
-def test_without_typst_one_line_says_what_to_install(monkeypatch):
+def test_without_typst_one_line_says_what_to_install(monkeypatch, document):
     monkeypatch.setitem(sys.modules, "typst", None)
     with pytest.raises(InputError, match=r'needs typst, which is missing \(expected: pip install "catseye\[pdf\]"'):
-        certificate_pdf(document_of(certified()))
+        certificate_pdf(document)
 
 
-def test_a_certificate_has_the_same_bytes_twice_with_its_title_author_and_day(typst):
-    document = document_of(certified())
+def test_a_certificate_has_the_same_bytes_twice_with_its_title_author_and_day(typst, document):
     content = certificate_pdf(document)
     assert content == certificate_pdf(document)
     assert content.startswith(b"%PDF")
@@ -58,28 +56,25 @@ def test_a_certificate_has_the_same_bytes_twice_with_its_title_author_and_day(ty
     assert int(re.search(rb"/Type/Pages/Count (\d+)", content)[1]) >= 4
 
 
-def test_hostile_texts_come_out_as_texts(typst):
-    document = hostile_document(certified())
-    certificate_pdf(document)
-    assert f"Certificate of calibration {document.number}" in texts(typst, document, "heading.where(level: 1)")
-    cells = texts(typst, document, "table")
-    for text in HOSTILE:
+def test_hostile_texts_come_out_as_texts(hostile, hostile_texts):
+    certificate_pdf(hostile)
+    assert f"Certificate of calibration {hostile.number}" in texts(hostile, "heading.where(level: 1)")
+    cells = texts(hostile, "table")
+    for text in hostile_texts:
         assert text in cells
 
 
-def test_every_cell_of_every_table_is_set(typst):
-    document = document_of(certified())
-    cells = set(texts(typst, document, "table"))
+def test_every_cell_of_every_table_is_set(typst, document):
+    cells = set(texts(document, "table"))
     for chapter in (document.results, *document.chapters):
         for block in chapter.blocks:
-            for row in block.rows if isinstance(block, Grid) else ():
+            for row in block.rows if isinstance(block, CellTable) else ():
                 for cell, kind in zip(row, block.kinds, strict=True):
                     minus = kind == "n" and cell.startswith("-")
                     assert not cell or ("−" + cell[1:] if minus else cell) in cells
 
 
-def test_a_logo_of_either_kind_is_drawn_and_a_broken_one_is_one_line(typst):
-    document = document_of(certified())
+def test_a_logo_of_either_kind_is_drawn_and_a_broken_one_is_one_line(typst, document):
     from io import BytesIO
 
     import matplotlib.image

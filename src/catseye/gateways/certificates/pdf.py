@@ -1,21 +1,24 @@
 """Certificate as PDF by typst: the same bytes for the same content."""
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.gateways.calibrations.certificate_typst import TEMPLATE
-from catseye.gateways.calibrations.document import (
+from catseye.gateways.certificates.document import (
     NOT_STATED,
     Block,
+    CellTable,
     CertificateDocument,
     Chapter,
-    Drawing,
     Facts,
-    Grid,
     Listing,
     Paragraph,
+    SvgPicture,
+    breakable,
+    cells_of,
 )
+from catseye.gateways.certificates.layout import TEMPLATE
 from catseye.version import __version__
 
 PNG = b"\x89PNG"
@@ -56,18 +59,18 @@ def _data(document: CertificateDocument) -> dict[str, Any]:
         "keywords": [*document.marks, f"catseye {__version__}"],
         "date": [day.year, day.month, day.day],
         "missing": NOT_STATED,
-        "heading": document.heading,
-        "subject": document.subject,
-        "foot": letterhead.name,
+        "heading": breakable(document.heading),
+        "subject": breakable(document.subject),
+        "foot": breakable(letterhead.name),
         "logo": _picture(letterhead.logo) if letterhead.logo else None,
         "laboratory": {
-            "name": letterhead.name,
-            "lines": list(letterhead.lines),
-            "accreditation": letterhead.accreditation,
+            "name": breakable(letterhead.name),
+            "lines": [breakable(line) for line in letterhead.lines],
+            "accreditation": breakable(letterhead.accreditation),
         },
-        "verdict": {"word": document.verdict.word, "why": document.verdict.why},
-        "facts": document.facts.rows,
-        "signatures": document.signatures,
+        "verdict": {"word": document.verdict.word, "why": breakable(document.verdict.why)},
+        "facts": _rows(document.facts.rows),
+        "signatures": _rows(document.signatures),
         "results": _chapter(document.results),
         "chapters": [_chapter(chapter) for chapter in document.chapters],
     }
@@ -80,17 +83,20 @@ def _chapter(chapter: Chapter) -> dict[str, Any]:
 def _block(block: Block) -> dict[str, Any]:
     match block:
         case Facts():
-            return {"kind": "facts", "rows": block.rows}
+            return {"kind": "facts", "rows": _rows(block.rows)}
         case Paragraph():
-            return {"kind": "paragraph", "text": block.text, "faint": block.faint}
-        case Grid():
-            rows = [list(row) for row in block.rows]
-            return {"kind": "grid", "columns": block.columns, "kinds": list(block.kinds), "rows": rows,
-                    "caption": block.caption}  # fmt: skip
-        case Drawing():
-            return {"kind": "drawing", "image": _picture(block.svg.encode()), "caption": block.caption}
+            return {"kind": "paragraph", "text": breakable(block.text), "faint": block.faint}
+        case CellTable():
+            return {"kind": "grid", "columns": block.columns, "kinds": list(block.kinds), "rows": cells_of(block),
+                    "caption": breakable(block.caption)}  # fmt: skip
+        case SvgPicture():
+            return {"kind": "drawing", "image": _picture(block.svg.encode()), "caption": breakable(block.caption)}
         case Listing():
-            return {"kind": "listing", "caption": block.caption, "lines": block.lines}
+            return {"kind": "listing", "caption": block.caption, "lines": [breakable(line) for line in block.lines]}
+
+
+def _rows(rows: Sequence[tuple[str, ...]]) -> list[list[str]]:
+    return [[breakable(cell) for cell in row] for row in rows]
 
 
 def _picture(content: bytes) -> dict[str, Any]:

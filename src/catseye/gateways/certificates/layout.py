@@ -8,9 +8,7 @@ TEMPLATE = r"""
 #let line-colour = rgb("#d5dbe0")
 #let shades = (good: ("#eaf4f0", "#1e8e74"), doubtful: ("#fbf3e2", "#b87a00"), failed: ("#fbecec", "#c8323c"))
 #let signs = (good: "✓", doubtful: "?", failed: "✗")
-// A long word may break after every twelve characters, a name after its underscores.
-#let soft(s) = s.replace(regex("[^\s\u{200b}]{12}"), m => m.text + "\u{200b}").replace("_", "_\u{200b}")
-#let words(s) = text(soft(s))
+#let words(s) = text(s)
 #let picture-of(image-data, ..arguments) = image(
   bytes(image-data.bytes), format: image-data.format, ..arguments,
 )
@@ -72,7 +70,7 @@ TEMPLATE = r"""
 }
 
 #let written(cell, kind, size) = if kind == "n" { text(cell.replace(regex("^-"), "−")) } else if kind == "h" {
-  text(font: "DejaVu Sans Mono", size: 0.8 * size, soft(cell))
+  text(font: "DejaVu Sans Mono", size: 0.8 * size, cell)
 } else { words(cell) }
 #let caption(s) = block(above: 4mm, below: 2mm, sticky: true, text(size: 9pt, weight: "bold", words(s)))
 #let grid-table(it) = {

@@ -3,44 +3,54 @@
 import base64
 from html import escape
 
-from catseye.gateways.calibrations.document import (
+from catseye.gateways.certificates.document import (
+    BREAK,
     NOT_STATED,
     Block,
+    CellTable,
     CertificateDocument,
     Chapter,
-    Drawing,
     Facts,
-    Grid,
     Letterhead,
     Listing,
     Paragraph,
+    SvgPicture,
+    cells_of,
 )
 from catseye.gateways.writers.page import page, paragraph, picture, section, table
 from catseye.gateways.writers.verdict import verdict_line
 
 PNG = b"\x89PNG"
+FEW = 6  # facts in one column
 STYLE = """
 .letter { display: flex; gap: 1.2rem; align-items: center; border-bottom: 3px solid var(--accent);
   padding-bottom: .7rem; }
 .letter img { max-height: 4.4rem; max-width: 14rem; } .letter div { flex: 1; font-size: .86rem; line-height: 1.35; }
 .letter b { font-size: 1.05rem; } .letter .accreditation { text-align: right; flex: 0 1 16rem; }
+td.t, th.t { hyphens: none; }
 h1 { margin: 1.2rem 0 0; overflow-wrap: anywhere; }
 dl.facts { grid-template-columns: max-content 1fr max-content 1fr; gap: .15rem .9rem; font-size: .88rem; }
+dl.few { grid-template-columns: max-content 1fr; }
 dl.facts dt { font-weight: 400; color: var(--faint); } dl.facts dd { overflow-wrap: anywhere; }
 .scroll { max-height: none; } .block { margin: 1.1rem 0 0; font-weight: 600; font-size: .9rem; }
-td, th { overflow-wrap: anywhere; } td.n, th.n { overflow-wrap: normal; }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--soft); padding: .6rem .9rem; }
 .sign { display: grid; grid-template-columns: repeat(3, 1fr); gap: 2.4rem 2rem; margin: 3.2rem 0 1rem; }
 .sign div { border-top: 1px solid var(--ink); padding-top: .3rem; font-size: .85rem; color: var(--faint);
   overflow-wrap: anywhere; }
 .sign b { display: block; color: var(--ink); }
 @media (max-width: 40rem) { dl.facts { grid-template-columns: max-content 1fr; }
-  .sign { grid-template-columns: 1fr; } .letter { flex-wrap: wrap; } }
-@media print { .sign { break-inside: avoid; break-before: avoid; } .scroll { break-inside: auto; }
+  .sign { grid-template-columns: 1fr; } .letter { flex-wrap: wrap; }
+  .letter .accreditation { text-align: left; flex-basis: 100%; } }
+@media print {
+  .sign { break-inside: avoid; break-before: avoid; margin-top: 2.4rem; } .sign div { font-size: 8pt; }
+  .scroll { break-inside: auto; } p.block { break-after: avoid; font-size: 8.4pt; margin-top: .8rem; }
   td.w { min-width: 0; } th, td { padding: .2rem .35rem; } thead { display: table-header-group; }
-  table { font-size: 7.4pt; table-layout: auto; } section { break-inside: auto; } dl.facts { font-size: 8.2pt; }
-  td.h { font-size: 6.6pt; } h1 { font-size: 17pt; } h2 { font-size: 12pt; margin-top: 1.4rem; }
-  p { max-width: none; } * { print-color-adjust: exact; } }
+  table { font-size: 7.4pt; table-layout: auto; } section { break-inside: auto; }
+  dl.facts, dl.facts dd { font-size: 8.2pt; line-height: 1.45; } td.h { font-size: 6.6pt; }
+  h1 { font-size: 17pt; } h2 { font-size: 12pt; margin-top: 1.4rem; }
+  p { max-width: none; font-size: 9pt; line-height: 1.4; } p.faint { font-size: 7.6pt; line-height: 1.35; }
+  .letter div { font-size: 8.4pt; } .letter img { max-height: 15mm; } .verdict { padding: .4rem .8rem; }
+  * { print-color-adjust: exact; } }
 """
 
 
@@ -53,12 +63,11 @@ def certificate_html(document: CertificateDocument) -> str:
         f'<p class="faint">{escape(document.subject)}</p>',
         verdict_line(document.verdict),
         _block(document.facts),
-        _chapter(document.results),
-        _signatures(document.signatures),
+        _results(document),
         *(_chapter(chapter) for chapter in document.chapters),
     ]
     text = page(f"{document.heading}: {document.subject}", "\n".join(body))
-    return text.replace("<head>\n", f"<head>\n<!-- {' '.join(document.marks)} -->\n", 1)
+    return text.replace(BREAK, "<wbr>").replace("<head>\n", f"<head>\n<!-- {' '.join(document.marks)} -->\n", 1)
 
 
 def _page_style(document: CertificateDocument) -> str:
@@ -93,6 +102,13 @@ def _letterhead(letterhead: Letterhead) -> str:
     )
 
 
+def _results(document: CertificateDocument) -> str:
+    """Results with the signatures beneath the table, on the same page of paper where it ends."""
+    table_of_results, *explanations = document.results.blocks
+    parts = [_block(table_of_results), _signatures(document.signatures), *(_block(block) for block in explanations)]
+    return section(document.results.key, document.results.title, *parts)
+
+
 def _signatures(signatures: tuple[tuple[str, str], ...]) -> str:
     lines = "".join(
         f"<div>{f'<b>{escape(name)}</b>' if name else ''}{escape(role)}, date, signature</div>"
@@ -112,13 +128,14 @@ def _block(block: Block) -> str:
                 f"<dt>{escape(name)}</dt><dd{' class=faint' if text == NOT_STATED else ''}>{escape(text)}</dd>"
                 for name, text in block.rows
             )
-            return f'<dl class="facts">{rows}</dl>'
+            few = " few" if len(block.rows) <= FEW else ""
+            return f'<dl class="facts{few}">{rows}</dl>'
         case Paragraph():
             return paragraph(block.text, "faint" if block.faint else "")
-        case Grid():
+        case CellTable():
             caption = f'<p class="block">{escape(block.caption)}</p>' if block.caption else ""
-            return caption + table(block.columns, block.rows, block.kinds)
-        case Drawing():
+            return caption + table(block.columns, cells_of(block), block.kinds)
+        case SvgPicture():
             return picture(block.svg, block.caption)
         case Listing():
             lines = escape("\n".join(block.lines))

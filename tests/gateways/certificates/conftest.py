@@ -1,12 +1,13 @@
-"""A certificate with laboratory and job, as it is meant and with hostile texts in its records."""
+"""Scene of a certificate with laboratory and job, as it is meant and with hostile texts in its records."""
 
 import dataclasses
 from datetime import UTC, datetime
-from functools import cache
+
+import pytest
 
 import catseye
 from catseye.gateways.calibrations.calibration_certificate import calibration_subject
-from catseye.gateways.calibrations.certificate import certificate_document
+from catseye.gateways.certificates.statement import certificate_document
 from catseye.records.laboratory.certificate_job import CertificateJob, CertificateRecords, LaboratoryRecord
 from repository import ROOT
 
@@ -15,7 +16,12 @@ WHEN = datetime(2026, 9, 30, 23, 0, tzinfo=UTC)
 HOSTILE = ('<script>alert(1)</script> & "q" --> #panic("x") $x$ *b* \\u{1} ]] [', "W" * 300, "−–ẑ x̂ α₁ π θ ° ± ²")
 
 
-@cache
+@pytest.fixture(scope="session")
+def when():
+    return WHEN
+
+
+@pytest.fixture(scope="session")
 def certified():
     """Linearity with the laboratory and the job of the examples."""
     return catseye.calibrate(
@@ -26,14 +32,31 @@ def certified():
     )
 
 
-def document_of(result):
-    return certificate_document(
-        calibration_subject(result.calibration), result.issue.records, result.issue.conformities, WHEN
-    )
+@pytest.fixture(scope="session")
+def document_of():
+    """Function of a calibration's result -> document of its certificate."""
+
+    def made(result):
+        subject = calibration_subject(result.calibration)
+        return certificate_document(subject, result.issue.records, result.issue.conformities, WHEN)
+
+    return made
 
 
-def hostile_document(result):
-    """The same certificate with markup of every kind and very long words in its records."""
+@pytest.fixture(scope="session")
+def document(certified, document_of):
+    return document_of(certified)
+
+
+@pytest.fixture(scope="session")
+def hostile_texts():
+    """Markup of every kind, a very long word, and signs that a font may lack."""
+    return HOSTILE
+
+
+@pytest.fixture(scope="session")
+def hostile(certified):
+    """The certificate with markup of every kind and very long words in its records."""
     markup, long, signs = HOSTILE
     laboratory = LaboratoryRecord(
         format="catseye-laboratory-1", name=markup, address=[long, signs], accreditation=long,
@@ -44,5 +67,5 @@ def hostile_document(result):
         customer={"name": long, "address": [markup]},
         reference=[{"name": markup, "traceability": long, "laboratory": signs}],
     )  # fmt: skip
-    subject = dataclasses.replace(calibration_subject(result.calibration), title=markup)
+    subject = dataclasses.replace(calibration_subject(certified.calibration), title=markup)
     return certificate_document(subject, CertificateRecords(laboratory, b"", job), (), WHEN)

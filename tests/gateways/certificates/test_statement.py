@@ -7,18 +7,12 @@ import pytest
 
 import catseye
 from catseye.gateways.calibrations.calibration_certificate import calibration_subject
-from catseye.gateways.calibrations.certificate import certificate_document
-from catseye.gateways.calibrations.certificate_html import certificate_html
-from catseye.gateways.calibrations.document import NOT_STATED, Facts, Grid, Paragraph
 from catseye.gateways.calibrations.field_certificate import report_subject
+from catseye.gateways.certificates.document import NOT_STATED, CellTable, Facts, Paragraph
+from catseye.gateways.certificates.page import certificate_html
+from catseye.gateways.certificates.statement import certificate_document
 from catseye.records.laboratory.certificate_job import CertificateRecords
-from certificate_scene import WHEN, certified, document_of, hostile_document
 from repository import ROOT
-
-
-@pytest.fixture(scope="module")
-def result():
-    return certified()
 
 
 def blocks_of(document, kind):
@@ -27,12 +21,11 @@ def blocks_of(document, kind):
 
 
 def grid(document, heading):
-    [found] = [block for block in blocks_of(document, Grid) if block.columns[0] == heading]
+    [found] = [block for block in blocks_of(document, CellTable) if block.columns[0] == heading]
     return found
 
 
-def test_everything_that_was_stated_is_there(result):
-    document = document_of(result)
+def test_everything_that_was_stated_is_there(certified, document):
     facts = dict(document.facts.rows)
     assert document.heading == "Certificate of calibration EX-2026-0143"
     assert document.issued_on.isoformat() == facts["issued on"] == "2026-09-04"
@@ -48,14 +41,14 @@ def test_everything_that_was_stated_is_there(result):
     assert standards.rows[0][:3] == ("laser interferometer", "I-7", "R-2025-118")
     assert NOT_STATED not in "".join("".join(row) for row in standards.rows)
     raw = dict(grid(document, "raw data").rows)
-    assert raw == result.calibration.provenance["inputs_sha256"]
+    assert raw == certified.calibration.provenance["inputs_sha256"]
     assert [row[-2] for row in document.results.blocks[0].rows][:3] == ["pass", "conditional pass", "–"]
-    decided = [row for block in blocks_of(document, Grid) if "guard band" in block.columns for row in block.rows]
+    decided = [row for block in blocks_of(document, CellTable) if "guard band" in block.columns for row in block.rows]
     assert decided[0][:5] == ("zero_mm", "-0.1", "0.1", "mm", "0.018")
     assert decided[1][5:7] == ("0.9462", "conditional pass")
 
 
-def test_what_nobody_stated_is_printed_so():
+def test_what_nobody_stated_is_printed_so(document_of):
     found = catseye.calibrate("leakage", "calibrations/leakage.csv")
     document = document_of(found)
     facts = dict(document.facts.rows)
@@ -79,40 +72,40 @@ def test_what_nobody_stated_is_printed_so():
     assert [name for _, name in document.signatures] == [""] * 3
 
 
-def test_the_readings_own_weather_is_the_environment_where_the_job_has_none():
+def test_the_readings_own_weather_is_the_environment_where_the_job_has_none(document_of):
     document = document_of(catseye.calibrate("linearity", "calibrations/linearity.csv"))
     assert grid(document, "environment during the work").rows[0] == (
         "temperature", "20.4", "20.4", "0.1", "°C", "readings and sheet"
     )  # fmt: skip
 
 
-def test_a_budget_on_the_certificate_adds_up_as_printed(result):
-    budgets = [block for block in blocks_of(document_of(result), Grid) if block.columns[0] == "contribution"]
-    assert len(budgets) == len(result.keys)
+def test_a_budget_on_the_certificate_adds_up_as_printed(certified, document):
+    budgets = [block for block in blocks_of(document, CellTable) if block.columns[0] == "contribution"]
+    assert len(budgets) == len(certified.keys)
     for block in budgets[:2]:
         parts = [float(row[7]) for row in block.rows if "·" not in row[7]]
         assert sum(p**2 for p in parts[:-1]) ** 0.5 == pytest.approx(parts[-1], rel=1e-3)  # four digits are printed
 
 
-def test_an_expired_standard_is_named_so(result):
-    job = result.issue.records.job
+def test_an_expired_standard_is_named_so(certified, when):
+    job = certified.issue.records.job
     old = job.reference[0].model_copy(update={"valid_until": date(2026, 8, 31)})
-    records = dataclasses.replace(result.issue.records, job=job.model_copy(update={"reference": (old,)}))
-    document = certificate_document(calibration_subject(result.calibration), records, (), WHEN)
+    records = dataclasses.replace(certified.issue.records, job=job.model_copy(update={"reference": (old,)}))
+    document = certificate_document(calibration_subject(certified.calibration), records, (), when)
     assert grid(document, "standard").rows[0][5] == "2026-08-31, before the measurement"
 
 
-def test_one_content_has_one_mark_and_another_has_another(result):
-    one, two = document_of(result), document_of(result)
+def test_one_content_has_one_mark_and_another_has_another(certified, document_of):
+    one, two = document_of(certified), document_of(certified)
     assert one.content_mark == two.content_mark
     other = dataclasses.replace(one, subject="another")
     assert (other.number_mark, other.content_mark != one.content_mark) == (one.number_mark, True)
 
 
 @pytest.mark.parametrize(("kind", "record"), [("monument", "monuments/ZY3.toml"), ("mirror", "mirrors/ZP3.toml")])
-def test_a_record_without_uncertainties_says_so(kind, record):
+def test_a_record_without_uncertainties_says_so(kind, record, when):
     found = catseye.certificate(kind, record)
-    document = certificate_document(report_subject(found.report), CertificateRecords(), (), WHEN)
+    document = certificate_document(report_subject(found.report), CertificateRecords(), (), when)
     assert {row[2] for row in document.results.blocks[0].rows} == {NOT_STATED}
     assert len(document.results.blocks[0].rows) == len(found.report.quantities)
 
@@ -142,8 +135,8 @@ def test_direction_cosines_have_the_budget_of_their_angles(tmp_path, kind, recor
         }  # fmt: skip
 
 
-def test_a_page_escapes_every_text(result):
-    text = certificate_html(hostile_document(result))
+def test_a_page_escapes_every_text(hostile):
+    text = certificate_html(hostile)
     assert "<script" not in text
     assert "&lt;script&gt;" in text
     foot = text[text.index("@bottom-left") : text.index("@bottom-right")]
@@ -151,8 +144,8 @@ def test_a_page_escapes_every_text(result):
     assert "<" not in foot
 
 
-def test_a_page_prints_with_numbers_and_without_a_column_cut_off(result):
-    text = certificate_html(document_of(result))
+def test_a_page_prints_with_numbers_and_without_a_column_cut_off(document):
+    text = certificate_html(document)
     assert 'content: "page " counter(page) " of " counter(pages)' in text
     assert "td.w { min-width: 0; }" in text
     assert "thead { display: table-header-group; }" in text
