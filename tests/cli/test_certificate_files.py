@@ -111,3 +111,36 @@ def test_a_record_has_a_certificate_beside_its_form(catseye, tmp_path, kind, rec
     assert (status, out) == (1, "")
     assert "a blank form has no results" in err
     assert not (tmp_path / "blank.html").exists()
+
+
+def test_a_triplet_has_a_certificate_one_sheet_at_a_time(catseye, tmp_path):
+    page = tmp_path / "tr.html"
+    options = ("--certificate", page, "--laboratory", EXAMPLES / "laboratory.toml", "--quiet")
+    assert catseye("triplet", "triplets/TR01.toml", *options) == (0, "", "")
+    text = page.read_text(encoding="utf-8")
+    for word in ("h_corr_mm", "l_mpbc_mm", "difference_mm", "index ratio", "0.15 mm", "Example Length Laboratory"):
+        assert word in text
+    both = ("triplet", "triplets/TR01.toml", "triplets/TR02.toml")
+    status, _, err = catseye(*both, *options)
+    assert status == 2
+    assert "--laboratory and --job are of one certificate" in err
+    status, _, err = catseye(*both, "--certificate", tmp_path / "new.html", "--quiet")
+    assert status == 1
+    assert "2 sheets were read (expected one" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["tr.html"]
+
+
+def test_a_baseline_has_a_certificate_beside_its_record(catseye, tmp_path):
+    page, record = tmp_path / "b.html", tmp_path / "b.toml"
+    read = ("baselines/busselton/ts30-baseline-observations.csv", "--heights", "baselines/busselton/pillar-heights.csv")
+    options = ("--certificate", page, "--write", record, "--serial", "S-7", "--measured-on", "2021-03-01", "--quiet")
+    (tmp_path / "job.toml").write_text(
+        'format = "catseye-job-1"\ndecision_rule = "simple-acceptance"\n'
+        '[[specification]]\nkey = "zero_mm"\nlower = -1.0\nupper = 1.0\n',
+        encoding="utf-8",
+    )
+    assert catseye("baseline", *read, *options, "--job", tmp_path / "job.toml") == (0, "", "")
+    text = page.read_text(encoding="utf-8").replace("<wbr>", "")  # where a long word may break
+    for word in ("S-7", "2021-03-01", "scatter of the sets", "x_6_m", "ts30-baseline-observations.csv", ">pass<"):
+        assert word in text
+    assert record.exists()

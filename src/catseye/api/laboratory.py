@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.certificates.file import CertificateFile
+    from catseye.gateways.certificates.statement import CertifiedSubject
     from catseye.gateways.writers.passage import Passage
     from catseye.reduction.calibrations.calibration import Calibration
     from catseye.reduction.calibrations.conformity import CertificateIssue
@@ -322,6 +323,7 @@ class TripletsResult(Result):
     accepted      (n,) bool: |difference| within the memo's 0.15 mm
     conformity_probability   (n,)
     units         everything else: file and reduction of each sheet
+    issue         laboratory and job of a certificate, with statements of conformity
     hashes        SHA-256 of each file
     """
 
@@ -334,10 +336,12 @@ class TripletsResult(Result):
     accepted: np.ndarray
     conformity_probability: np.ndarray
     units: "tuple[tuple[Path, TripletReduction], ...]"
+    issue: "CertificateIssue"
     hashes: dict[Path, str] = field(default_factory=dict)
 
     def passages(self) -> "Sequence[Passage]":
         """The heights, their difference and what is worth knowing, unit by unit."""
+        from catseye.gateways.calibrations.summary import conformity_passages
         from catseye.gateways.triplet.sheet import results
         from catseye.gateways.writers.passage import Passage
 
@@ -345,7 +349,7 @@ class TripletsResult(Result):
         for path, unit in self.units:
             named = [Passage(unit.measurement.triplet, path.name)] if len(self.units) > 1 else []
             passages += [*named, *(Passage(title, text) for title, text in results(unit))]
-        return passages
+        return [*passages, *conformity_passages(self.issue.conformities)]
 
     def sheet(self) -> str:
         """Sheets with every symbol of the memo, as text."""
@@ -380,6 +384,20 @@ class TripletsResult(Result):
 
         return {path.stem: triplet_figure(unit) for path, unit in self.units}
 
+    def pages(self) -> dict[str, SinglePage]:
+        """`certificate` of a single unit, PDF or HTML by its name."""
+        from catseye.gateways.certificates.file import CertificateFile
+
+        return {"certificate": certificate_page(CertificateFile(self._subject, self.issue))}
+
+    def _subject(self) -> "CertifiedSubject":
+        from catseye.gateways.triplet.certificate import triplet_subject
+
+        if len(self.units) != 1:
+            raise InputError(f"certificate: {len(self.units)} sheets were read (expected one, for a certificate each)")
+        [(path, unit)] = self.units
+        return triplet_subject(unit, path.name, self.hashes[path])
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye triplet --out`."""
         from catseye.gateways.triplet.files import refuse_namesakes, write_triplets
@@ -392,14 +410,20 @@ class TripletsResult(Result):
         return {path.name: digest for path, digest in self.hashes.items()}
 
     def sources(self) -> tuple[Path, ...]:
-        """Files of the sheets, which `save` leaves alone."""
-        return tuple(path for path, _ in self.units)
+        """Files that were read, which `save` leaves alone."""
+        return (*(path for path, _ in self.units), *self.issue.records.read)
 
 
-def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) -> TripletsResult:
+def triplet(
+    *files: "str | os.PathLike[str]",
+    laboratory: "str | os.PathLike[str] | None" = None,
+    job: "str | os.PathLike[str] | None" = None,
+    progress: Progress | None = None,
+) -> TripletsResult:
     """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not.
 
     files      sheets of measured units (docs/formats/triplet.md)
+    laboratory, job   who issues the certificate of a single sheet, for whom (docs/formats/certificates.md)
     progress   called with (what, done, of how many)
 
     Raises InputError for a sheet that cannot be used, and without any.
@@ -409,11 +433,15 @@ def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) 
     """
     from catseye.records.files.reading import Folder
     from catseye.records.laboratory.triplet_measurement import TripletMeasurement
+    from catseye.reduction.calibrations.conformity import certificate_issue
+    from catseye.reduction.triplet.certified import triplet_quantities
     from catseye.reduction.triplet.unit import reduce_triplet
     from catseye.verdict import worst
 
     if not files:
         raise InputError("triplet needs a sheet (expected one file or more)")
+    if len(files) > 1 and (laboratory is not None or job is not None):
+        raise ArgumentError("laboratory and job are of one certificate (expected a single sheet)", "job", "laboratory")
     units: list[tuple[Path, TripletReduction]] = []
     hashes: dict[Path, str] = {}
     for done, sheet in enumerate(files):
@@ -424,6 +452,7 @@ def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) 
         units.append((path, reduce_triplet(folder.record(path.name, TripletMeasurement))))
         hashes[path] = folder.hashes[path.name]
     found = [unit for _, unit in units]
+    results = triplet_quantities(found[0]) if len(found) == 1 else ()
     return TripletsResult(
         verdict=worst([unit.verdict for unit in found]),
         names=tuple(unit.measurement.triplet for unit in found),
@@ -435,6 +464,7 @@ def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) 
         accepted=np.array([unit.accepted for unit in found]),
         conformity_probability=np.array([unit.conformity_probability for unit in found]),
         units=tuple(units),
+        issue=certificate_issue(results, *certificate_places(laboratory, job)),
         hashes=hashes,
     )
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from catseye.cli.commands import Job, Json, Laboratory, Quiet, app
+from catseye.cli.commands import Certificate, Job, Json, Laboratory, Quiet, app
 from catseye.cli.results import Strict, tell
 from catseye.cli.vocabularies import CALIBRATION_KINDS, one_of
 
@@ -34,10 +34,7 @@ def calibrate(  # noqa: PLR0913 - its options are its command line
     write: Annotated[
         Path | None, typer.Option("--write", metavar="RECORD.toml", help="Record to write: new, or an earlier one.")
     ] = None,
-    certificate: Annotated[
-        Path | None,
-        typer.Option("--certificate", metavar="FILE.pdf", help="Certificate to sign, .pdf or .html."),
-    ] = None,
+    certificate: Certificate = None,
     laboratory: Laboratory = None,
     job: Job = None,
     json: Json = False,

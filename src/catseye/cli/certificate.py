@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from catseye.cli.commands import Job, Json, Laboratory, Quiet, app
+from catseye.cli.commands import Certificate, Job, Json, Laboratory, Quiet, app
 from catseye.cli.results import tell
 from catseye.cli.vocabularies import REPORT_KINDS, one_of
 
@@ -30,10 +30,7 @@ def certificate(  # noqa: PLR0913 - its options are its command line
         Path | None,
         typer.Option("--out", metavar="PAGE.html", help="Form of the notes to write: new, or an earlier one."),
     ] = None,
-    certificate: Annotated[
-        Path | None,
-        typer.Option("--certificate", metavar="FILE.pdf", help="Certificate to sign, .pdf or .html."),
-    ] = None,
+    certificate: Certificate = None,
     blank: Annotated[bool, typer.Option("--blank", help="A blank form for the field book.")] = False,
     laboratory: Laboratory = None,
     job: Job = None,

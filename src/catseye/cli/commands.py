@@ -114,6 +114,9 @@ Threads = Annotated[
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]
+Certificate = Annotated[
+    Path | None, typer.Option("--certificate", metavar="FILE.pdf", help="Certificate to sign, .pdf or .html.")
+]
 Laboratory = Annotated[
     Path | None,
     typer.Option("--laboratory", metavar="LAB.toml", help="Laboratory of the certificate."),
