@@ -52,7 +52,7 @@ def test_a_number_is_used_once_among_directories_of_results(tmp_path):
     catseye.save(one, tmp_path / "one")
     catseye.save(one, tmp_path / "one")  # the same again
     other = catseye.calibrate("repeatability", "calibrations/repeatability.csv", job=job)
-    with pytest.raises(InputError, match=r"number '7' stands in certificate\.html already"):
+    with pytest.raises(InputError, match=r"number '7' stands in one/certificate\.html already"):
         catseye.save(other, tmp_path / "two")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["job.toml", "one"]
 

@@ -4,9 +4,13 @@ import dataclasses
 import json
 import re
 import sys
+from io import BytesIO
 
+import matplotlib.image
+import numpy as np
 import pytest
 
+import catseye
 from catseye.errors import InputError
 from catseye.gateways.certificates.document import CellTable
 from catseye.gateways.certificates.pdf import certificate_pdf, typeset
@@ -74,12 +78,18 @@ def test_every_cell_of_every_table_is_set(typst, document):
                     assert not cell or ("−" + cell[1:] if minus else cell) in cells
 
 
+@pytest.mark.parametrize("kind", ["inclinometer", "search-results"])  # the widest tables: 11 columns, 13 correlations
+def test_nothing_stands_beyond_the_margins(typst, document_of, kind):
+    document = document_of(catseye.calibrate(kind, f"calibrations/{kind}.csv"))
+    pages = typeset(document).compile(format="png", ppi=40.0)
+    assert len(pages) > 3
+    for page in pages:
+        grey = matplotlib.image.imread(BytesIO(page), format="png")[..., :3].mean(axis=2)
+        margin = int(grey.shape[1] * 17 / 210)  # mm; the margin is 18
+        assert grey[:, :margin].min() == grey[:, -margin:].min() == 1.0
+
+
 def test_a_logo_of_either_kind_is_drawn_and_a_broken_one_is_one_line(typst, document):
-    from io import BytesIO
-
-    import matplotlib.image
-    import numpy as np
-
     stream = BytesIO()
     matplotlib.image.imsave(stream, np.full((20, 40), 0.3), format="png")
     for logo in (stream.getvalue(), document.letterhead.logo):

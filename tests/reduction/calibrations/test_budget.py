@@ -31,6 +31,7 @@ def test_the_contributions_of_every_kind_add_up_to_its_u(kind):
         # 1e-6: priors of very different size are inverted together
         assert combined(q.budget) == pytest.approx(q.u, rel=1e-6)
         assert all(row.part > 0.0 and row.degrees > 0.0 and row.source for row in q.budget)
+        assert all(row.unit or not q.unit for row in q.budget), [row.source for row in q.budget if not row.unit]
         if np.isfinite(q.degrees):
             assert welch_satterthwaite(q.budget) == pytest.approx(q.degrees, rel=1e-5)
             assert q.coverage == pytest.approx(student_t.ppf(0.5 * (1.0 + 0.954499736), q.degrees), rel=1e-6)

@@ -41,7 +41,7 @@ class CertificateFile:
     def refuse_beside(self, now: datetime, directory: Path) -> None:
         """Raise InputError where another certificate of its number is beside a directory, or in one beside it."""
         if self.issue.records.number is not None:
-            refuse_number(directory, self._document(now), folders=True)
+            refuse_number(directory.parent / "certificate.html", self._document(now), folders=True)
 
     @lru_cache(maxsize=1)  # noqa: B019 - one short-lived file, whose figure takes half a second
     def _document(self, now: datetime) -> CertificateDocument:

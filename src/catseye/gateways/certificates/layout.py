@@ -57,16 +57,18 @@ TEMPLATE = r"""
 }
 
 // Width of the cells, in characters: a word in a wide column may break, a number may not.
-#let table-size(rows, kinds) = {
+#let table-size(rows, kinds, heads) = {
   let total = 0
   for (column, kind) in kinds.enumerate() {
     let longest = 0
     for row in rows { longest = calc.max(longest, row.at(column).clusters().len()) }
     let most = (w: 34, h: 50, t: 22, n: longest)
-    total += calc.min(longest, most.at(kind))
+    // A head is bold, and its words may break at spaces.
+    let head = calc.max(..heads.at(column).split(" ").map(word => 1.1 * word.clusters().len()))
+    total += calc.max(head, calc.min(longest, most.at(kind)))
   }
   let room = 174mm - kinds.len() * 3.4mm
-  calc.max(4.6pt, calc.min(8.6pt, room / calc.max(total, 1) / 0.52))
+  calc.max(4.6pt, calc.min(8.6pt, room / calc.max(total, 1) / 0.47))
 }
 
 #let written(cell, kind, size) = if kind == "n" { text(cell.replace(regex("^-"), "−")) } else if kind == "h" {
@@ -75,7 +77,7 @@ TEMPLATE = r"""
 #let caption(s) = block(above: 4mm, below: 2mm, sticky: true, text(size: 9pt, weight: "bold", words(s)))
 #let grid-table(it) = {
   if it.caption != "" { caption(it.caption) }
-  let size = table-size(it.rows, it.kinds)
+  let size = table-size(it.rows, it.kinds, it.columns)
   set text(size: size)
   show table.cell.where(y: 0): set text(weight: "bold")
   table(

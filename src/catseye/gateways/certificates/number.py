@@ -19,15 +19,16 @@ def refuse_number(path: Path, document: CertificateDocument, *, folders: bool = 
     """
     if document.number is None:
         return
-    for file in _certificates(path.resolve().parent, folders):
+    place = path.resolve().parent
+    for file in _certificates(place, folders):
         try:
             if not holds(file, document.number_mark) or holds(file, document.content_mark):
                 continue
         except OSError:  # a file that cannot be read is nobody's certificate
             continue
         raise InputError(
-            f"certificate {path}: number {document.number!r} stands in {file.name} already (expected a new number, and "
-            "this one as `replaces` of the job for an amendment)"
+            f"certificate {path}: number {document.number!r} stands in {file.relative_to(place)} already (expected a "
+            "new number, and this one as `replaces` of the job for an amendment)"
         )
 
 

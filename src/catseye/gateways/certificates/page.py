@@ -25,11 +25,12 @@ FEW = 6  # facts in one column
 STYLE = """
 .letter { display: flex; gap: 1.2rem; align-items: center; border-bottom: 3px solid var(--accent);
   padding-bottom: .7rem; }
-.letter img { max-height: 4.4rem; max-width: 14rem; } .letter div { flex: 1; font-size: .86rem; line-height: 1.35; }
+.letter img { max-height: 4.4rem; max-width: 14rem; } .letter div { flex: 1; min-width: 0; overflow-wrap: anywhere; font-size: .86rem; line-height: 1.35; }
 .letter b { font-size: 1.05rem; } .letter .accreditation { text-align: right; flex: 0 1 16rem; }
 td.t, th.t { hyphens: none; }
-h1 { margin: 1.2rem 0 0; overflow-wrap: anywhere; }
+h1 { margin: 1.2rem 0 0; }
 dl.facts { grid-template-columns: max-content 1fr max-content 1fr; gap: .15rem .9rem; font-size: .88rem; }
+p, h1 { overflow-wrap: anywhere; }
 dl.few { grid-template-columns: max-content 1fr; }
 dl.facts dt { font-weight: 400; color: var(--faint); } dl.facts dd { overflow-wrap: anywhere; }
 .scroll { max-height: none; } .block { margin: 1.1rem 0 0; font-weight: 600; font-size: .9rem; }

@@ -197,7 +197,7 @@ def _results(subject: CertifiedSubject, conformities: Sequence[Conformity]) -> C
 def _result(q: Quantity) -> tuple[str, str, str, str]:
     """Value, u, k and U of a quantity, rounded by U."""
     if math.isnan(q.u):
-        return f"{q.value:.12g}", NOT_STATED, "–", NOT_STATED
+        return _readable(q.value, 9), NOT_STATED, "–", NOT_STATED
     value, u, expanded = rounded_result(q.value, q.u, q.coverage)
     return value, u, f"{q.coverage:.2f}", expanded
 

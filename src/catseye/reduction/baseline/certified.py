@@ -1,5 +1,6 @@
 """Results of a baseline as calibrated quantities, each with its budget."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -48,7 +49,7 @@ def _quantity(calibration: BaselineCalibration, name: str, key: str, unit: str, 
     at = solution.names.index(name)
     value, u = solution.of(name)
     parts = {cause: float(part[at]) / size for cause, part in solution.parts.items()}
-    scatter = float(np.hypot(*(parts.pop(cause) for cause in SCATTERS)))
+    scatter = math.hypot(*(parts.pop(cause) for cause in SCATTERS))
     estimated = bool(np.isfinite(solution.u_noise).any())
     rows = [
         Contribution(

@@ -143,8 +143,8 @@ def _parameters(sheet: FocusSheet, place: np.ndarray, observed: np.ndarray) -> l
         ModelParameter("top", float(observed.max()), 1e-3),
         ModelParameter("best focus", float(best), 1e-4),
         ModelParameter("depth", max(depth, 1e-3), 1e-4),
-        ModelParameter("installed", sheet.installed_mm, 1e-4, sheet.u_installed_mm),
-        ModelParameter("coupling", sheet.amplitude_to_phase_rad or 0.0, 1e-6, sheet.u_amplitude_to_phase_rad),
+        ModelParameter("installed", sheet.installed_mm, 1e-4, sheet.u_installed_mm, "mm"),
+        ModelParameter("coupling", sheet.amplitude_to_phase_rad or 0.0, 1e-6, sheet.u_amplitude_to_phase_rad, "rad"),
         ModelParameter("half wavelength", sheet.half_wavelength_mm, 1e-3, 0.0),
     ]
     if sheet.model == CURVE:
