@@ -25,7 +25,8 @@ FEW = 6  # facts in one column
 STYLE = """
 .letter { display: flex; gap: 1.2rem; align-items: center; border-bottom: 3px solid var(--accent);
   padding-bottom: .7rem; }
-.letter img { max-height: 4.4rem; max-width: 14rem; } .letter div { flex: 1; min-width: 0; overflow-wrap: anywhere; font-size: .86rem; line-height: 1.35; }
+.letter img { max-height: 4.4rem; max-width: 14rem; } .letter div { flex: 1; min-width: 0; overflow-wrap: anywhere; }
+.letter div { font-size: .86rem; line-height: 1.35; }
 .letter b { font-size: 1.05rem; } .letter .accreditation { text-align: right; flex: 0 1 16rem; }
 td.t, th.t { hyphens: none; }
 h1 { margin: 1.2rem 0 0; }
