@@ -692,6 +692,16 @@ SOURCES: dict[str, Source] = {
         "1.5.4, eq. 61: phases of total reflection; section 14.2, eq. 13: metals (`optics.polarization`); the same "
         "formulae squared, for the faces of a retroreflector (`optics.retroreflector.interface`)",
     ),
+    "ISO17": Source(
+        title="ISO/IEC 17025, General requirements for the competence of testing and calibration laboratories",
+        locator="ISO/IEC 17025:2017",
+        used="7.8: contents of a calibration certificate, statement of uncertainty and of conformity",
+    ),
+    "ILAC19": Source(
+        title="ILAC, Guidelines on decision rules and statements of conformity, 2019",
+        locator="ILAC-G8:09/2019",
+        used="4.2.1 and 4.2.3: simple acceptance, and guarded acceptance with conditional statements",
+    ),
     "JCGM106": Source(
         title="JCGM, Evaluation of measurement data: The role of measurement uncertainty in conformity "
         "assessment, 2012",

@@ -17,7 +17,7 @@ def test_single_files_are_written_together_or_not_at_all(tmp_path):
     assert ">Results<" in (tmp_path / "c.html").read_text()
     (tmp_path / "mine.toml").write_text("mine")
     for paths, said in (
-        ({"record": tmp_path / "new.toml", "certificate": tmp_path / "c.pdf"}, "certificate .*a page is HTML"),
+        ({"record": tmp_path / "new.toml", "certificate": tmp_path / "c.png"}, "certificate .*is PDF or HTML"),
         ({"record": tmp_path / "mine.toml", "certificate": tmp_path / "new.html"}, "record .*not a catseye file"),
         ({"record": tmp_path / "new.html", "certificate": tmp_path / "new.html"}, "is the record too"),
         ({"record": tmp_path / "no" / "r.toml"}, "record .*its directory does not exist"),

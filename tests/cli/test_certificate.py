@@ -105,7 +105,7 @@ def test_a_bad_record_is_refused_with_key_value_and_limit(catseye, tmp_path, old
     ("arguments", "said"),
     [
         (("bogus", "--out", "x"), "'bogus' is not one of monument, mirror"),
-        (("monument", ZY3), "is needed unless --json is given"),
+        (("monument", ZY3), "is needed unless --certificate or --json is given"),
         (("monument", ZY3, "--blank", "--out", "x"), "--blank takes no record"),
         ((), "KIND"),
     ],

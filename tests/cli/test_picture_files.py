@@ -43,7 +43,6 @@ def test_another_suffix_and_anothers_file_are_refused(catseye, tmp_path):
     [
         ("certificate", "mirror", "--out"),
         ("triplet", "--blank"),
-        ("calibrate", "linearity", "calibrations/linearity.csv", "--certificate"),
     ],
 )
 def test_a_page_is_html_and_says_how_it_becomes_pdf(catseye, tmp_path, command):

@@ -8,6 +8,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.records.files.reading import Folder, read_record
 from catseye.records.files.record import Record
+from catseye.records.laboratory.certificate_job import CertificateJob, LaboratoryRecord
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import AcousticSheet
@@ -53,6 +54,8 @@ RECORDS: dict[str, type[Record]] = {
     "interlocks-1.toml": Interlocks,
     "panel-instrument-1.toml": PanelInstrument,
     "pointing-series-1.toml": PointingModel,
+    "laboratory-1.toml": LaboratoryRecord,
+    "job-1.toml": CertificateJob,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (BenchmarkRow, 6),

@@ -5,12 +5,14 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from catseye.aliases import Progress
+from catseye.api.laboratory import certificate_page, certificate_places
 from catseye.api.reading import place_of
 from catseye.api.result import Result, SinglePage, digest_of, quantities
 from catseye.api.units import In, with_units
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
     from catseye.gateways.writers.passage import Passage
     from catseye.reduction.baseline.result import BaselineCalibration
+    from catseye.reduction.calibrations.conformity import CertificateIssue
 
 LARGEST = 1e4  # mm, ppm, °C, hPa, %: beyond it a unit was meant otherwise
 HEIGHTS_M = (-9000.0, 9000.0)
@@ -43,6 +46,7 @@ class BaselineResult(Result):
     scale_ppm, u_scale_ppm   nan where no known baseline tells it
     calibration        everything else: sets, tests of ISO 17123-4, noise, budget
     hashes             SHA-256 of each file read, by its name
+    issue              laboratory and job of a certificate, with statements of conformity
     read               files that were read
     provenance         of the record: serial, measured_on, by, report; None where unknown
     """
@@ -54,15 +58,17 @@ class BaselineResult(Result):
     scale_ppm: float
     u_scale_ppm: float
     calibration: "BaselineCalibration"
+    issue: "CertificateIssue"
     hashes: dict[str, str] = field(default_factory=dict)
     read: tuple[Path, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def passages(self) -> "Sequence[Passage]":
-        """The shots, zero, scale, scatter, tests and notes."""
+        """The shots, zero, scale, scatter, tests, notes and conformity."""
         from catseye.gateways.baseline.objects import passages
+        from catseye.gateways.calibrations.summary import conformity_passages
 
-        return passages(self.calibration)
+        return [*passages(self.calibration), *conformity_passages(self.issue.conformities)]
 
     def headline(self) -> "Sequence[Passage]":
         """The three passages on shots, zero and scale."""
@@ -98,14 +104,18 @@ class BaselineResult(Result):
         return baseline_figures(self.calibration)
 
     def pages(self) -> dict[str, SinglePage]:
-        """`record`: the pillars with full covariance, to calibrate against."""
+        """`record`: the pillars with full covariance, to calibrate against; `certificate`, PDF or HTML by its name."""
+        from catseye.gateways.baseline.certificate import baseline_subject
         from catseye.gateways.baseline.files import MARK, record_text
+        from catseye.gateways.certificates.file import CertificateFile
 
         def text(now: datetime, path: Path) -> str:
             name = path.stem[:200] or "baseline"
             return record_text(self.calibration, self.hashes, name=name, **self.provenance)
 
-        return {"record": SinglePage(MARK, text)}
+        made = partial(baseline_subject, self.calibration, self.hashes, self.provenance)
+        page = certificate_page(CertificateFile(made, self.issue))
+        return {"record": SinglePage(MARK, text), "certificate": page}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye baseline --out`."""
@@ -151,6 +161,8 @@ def baseline(
     measured_on: "date | str | None" = None,
     by: str | None = None,
     report: str | None = None,
+    laboratory: "str | os.PathLike[str] | None" = None,
+    job: "str | os.PathLike[str] | None" = None,
     progress: Progress | None = None,
 ) -> BaselineResult:
     """Pillars of an EDM baseline, and the instrument's errors, with tests of ISO 17123-4.
@@ -169,6 +181,7 @@ def baseline(
     specified_mm, specified_ppm    standard deviation a + b D claimed by the maker
     level, reject        level of each test; leave out what the tests reject, one by one
     serial, measured_on, by, report   provenance of the record that `save_pages(record=...)` writes
+    laboratory, job      who issues the certificate, for whom and how (docs/formats/certificates.md)
     progress             called with (what, done, of how many)
 
     Raises InputError: files that cannot be used; ArgumentError: an invalid setting; EstimationError: no solution.
@@ -182,21 +195,28 @@ def baseline(
     )  # fmt: skip
     _require_valid(settings)
     provenance = {"serial": serial, "measured_on": _day(measured_on), "by": by, "report": report}
-    return _calibrated((observations, heights, against), settings, provenance, progress)
+    issued = certificate_places(laboratory, job)
+    return _calibrated((observations, heights, against), settings, provenance, issued=issued, progress=progress)
 
 
 def _calibrated(
     inputs: "Sequence[str | os.PathLike[str] | None]",
     settings: BaselineSettings,
     provenance: dict[str, Any],
+    *,
+    issued: "tuple[Path | None, Path | None]",
     progress: Progress | None,
 ) -> BaselineResult:
     """Baseline from its files: observations, heights, known pillars.
 
+    issued   records of the certificate: laboratory and job
+
     The text of a file is read once, with its digest.
     """
     from catseye.records.laboratory.baseline import read_baseline, read_heights, read_observations
+    from catseye.reduction.baseline.certified import baseline_quantities
     from catseye.reduction.baseline.instrument import calibrate_baseline
+    from catseye.reduction.calibrations.conformity import certificate_issue
 
     files = [None if each is None else place_of(each) for each in inputs]
     shots_file, heights_file, known_file = files
@@ -212,6 +232,7 @@ def _calibrated(
         known = read_baseline(known_file)
         hashes[known_file.name] = digest_of(known_file)
     found = calibrate_baseline(shots, tops, known, settings=settings, progress=progress)
+    issue = certificate_issue(baseline_quantities(found), *issued)
     zero, u_zero = found.solution.of("zero")
     scale, u_scale = found.solution.of("scale")
     return BaselineResult(
@@ -223,8 +244,9 @@ def _calibrated(
         scale_ppm=1e6 * scale,
         u_scale_ppm=1e6 * u_scale,
         calibration=found,
+        issue=issue,
         hashes=hashes,
-        read=tuple(path for path in files if path is not None),
+        read=(*(path for path in files if path is not None), *issue.records.read),
         provenance=provenance,
     )
 

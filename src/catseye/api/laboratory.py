@@ -3,6 +3,8 @@
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +20,27 @@ if TYPE_CHECKING:
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
+    from catseye.gateways.certificates.file import CertificateFile
+    from catseye.gateways.certificates.statement import CertifiedSubject
     from catseye.gateways.writers.passage import Passage
     from catseye.reduction.calibrations.calibration import Calibration
+    from catseye.reduction.calibrations.conformity import CertificateIssue
     from catseye.reduction.calibrations.field_report import Report
     from catseye.reduction.triplet.result import TripletReduction
+
+
+def certificate_page(file: "CertificateFile") -> SinglePage:
+    """Certificate as a single file of a result, PDF or HTML by its name."""
+    from catseye.gateways.certificates.document import MARK
+
+    return SinglePage(MARK, file.content, html=True, pdf=True, refuse=file.refuse)
+
+
+def certificate_places(
+    laboratory: "str | os.PathLike[str] | None", job: "str | os.PathLike[str] | None"
+) -> tuple[Path | None, Path | None]:
+    """Places of a certificate's two records, examples by name; None: not stated."""
+    return None if laboratory is None else place_of(laboratory), None if job is None else place_of(job)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,6 +53,7 @@ class CalibrationResult(Result):
     covariance    (q, q) in those units
     record        what can be copied into the record of the instrument
     calibration   everything else: residuals, tests, figure, provenance
+    issue         laboratory and job of its certificate, with statements of conformity
     read          files that were read
     """
 
@@ -44,14 +64,16 @@ class CalibrationResult(Result):
     covariance: np.ndarray
     record: dict[str, Any]
     calibration: "Calibration"
+    issue: "CertificateIssue"
     read: tuple[Path, ...]
 
     def passages(self) -> "Sequence[Passage]":
-        """Quantity, result, tests and readings."""
-        from catseye.gateways.calibrations.certificate import passages
+        """Quantity, result, conformity, tests and readings."""
+        from catseye.gateways.calibrations.summary import conformity_passages, passages
         from catseye.gateways.writers.passage import Passage
 
-        return [Passage(title, text) for title, text in passages(self.calibration)]
+        of_calibration = [Passage(title, text) for title, text in passages(self.calibration)]
+        return [*of_calibration, *conformity_passages(self.issue.conformities)]
 
     def headline(self) -> "Sequence[Passage]":
         """The calibration and what was found."""
@@ -87,28 +109,36 @@ class CalibrationResult(Result):
         return {"readings": calibration_figure(self.calibration)}
 
     def pages(self) -> dict[str, SinglePage]:
-        """`record`, to keep with the instrument's; `certificate`, a page to sign."""
-        from catseye.gateways.calibrations.certificate import MARK as PAGE_MARK
-        from catseye.gateways.calibrations.certificate import certificate as drawn
+        """`record`, to keep with the instrument's; `certificate`, to sign, PDF or HTML by its name."""
         from catseye.gateways.calibrations.certificate_record import MARK, calibration_toml
 
         return {
             "record": SinglePage(MARK, lambda now, path: calibration_toml(self.calibration)),
-            "certificate": SinglePage(PAGE_MARK, lambda now, path: drawn(self.calibration, now), html=True),
+            "certificate": certificate_page(self._certificate()),
         }
 
+    def _certificate(self) -> "CertificateFile":
+        from catseye.gateways.calibrations.calibration_certificate import calibration_subject
+        from catseye.gateways.certificates.file import CertificateFile
+
+        return CertificateFile(partial(calibration_subject, self.calibration), self.issue)
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Write record.toml and certificate.html with tables, figure and JSON."""
+        """Write record.toml and certificate.html with tables, figure and JSON.
+
+        Raises InputError where another certificate of this number is beside the directory or in a folder there.
+        """
+        self._certificate().refuse_beside(datetime.now(UTC), directory)
         self.write_files(
             directory, progress, self.page_texts({"record.toml": "record", "certificate.html": "certificate"})
         )
 
     def inputs(self) -> dict[str, str]:
-        """SHA-256 of the readings and of their sheet."""
+        """SHA-256 of the files that were read."""
         return {path.name: digest_of(path) for path in self.read if path.is_file()}
 
     def sources(self) -> tuple[Path, ...]:
-        """The readings and their sheet."""
+        """The readings and their sheet, the laboratory's record and the job."""
         return self.read
 
 
@@ -118,6 +148,8 @@ def calibrate(
     sheet: "str | os.PathLike[str] | None" = None,
     *,
     reject: bool = False,
+    laboratory: "str | os.PathLike[str] | None" = None,
+    job: "str | os.PathLike[str] | None" = None,
 ) -> CalibrationResult:
     """Calibration from a table of readings: quantities with covariance and tests.
 
@@ -125,6 +157,7 @@ def calibrate(
     readings   table (docs/formats/calibrations.md)
     sheet      who, when, with what; the file beside the table with the ending .toml without
     reject     leave out readings that the tests reject, one by one
+    laboratory, job   who issues the certificate, for whom and how (docs/formats/certificates.md)
 
     A calibration whose tests fail is a result, too: its verdict is "failed" and its values stand.
     Raises InputError for an unknown kind and for files that cannot be used.
@@ -132,11 +165,13 @@ def calibrate(
     >>> calibrate("linearity", "calibrations/linearity.csv").kind
     'linearity'
     """
+    from catseye.reduction.calibrations.conformity import certificate_issue
     from catseye.reduction.calibrations.kinds import calibrate as calibrated
 
     table = place_of(readings)
     beside = None if sheet is None else place_of(sheet)
     found = calibrated(kind, table, beside, reject=reject)
+    issue = certificate_issue(found.quantities, *certificate_places(laboratory, job))
     return CalibrationResult(
         verdict=found.verdict,
         kind=found.kind,
@@ -146,7 +181,8 @@ def calibrate(
         covariance=np.asarray(found.covariance),
         record=dict(found.record),
         calibration=found,
-        read=(table, table.with_suffix(".toml") if beside is None else beside),
+        issue=issue,
+        read=(table, table.with_suffix(".toml") if beside is None else beside, *issue.records.read),
     )
 
 
@@ -158,6 +194,7 @@ class CertificateResult(Result):
     keys      of the fields in the record
     missing   keys of the fields that the record lacks
     report    every field with its value, u and unit; provenance
+    issue     laboratory and job of its certificate, with statements of conformity
     read      file that was read; None: a blank form
     page      file that was written; None: none
     """
@@ -166,14 +203,16 @@ class CertificateResult(Result):
     keys: tuple[str, ...]
     missing: tuple[str, ...]
     report: "Report"
+    issue: "CertificateIssue"
     read: Path | None
     page: Path | None = None
 
     def passages(self) -> "Sequence[Passage]":
-        """Title and number of the report, and the missing fields."""
+        """Title and number of the report, the missing fields, and conformity."""
         from catseye.gateways.calibrations.field_report_fields import report_passages
+        from catseye.gateways.calibrations.summary import conformity_passages
 
-        return report_passages(self.report)
+        return [*report_passages(self.report), *conformity_passages(self.issue.conformities)]
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye certificate --json`."""
@@ -194,20 +233,31 @@ class CertificateResult(Result):
         return {"fields": quantities(columns)}
 
     def pages(self) -> dict[str, SinglePage]:
-        """`page`: the report, to print and sign."""
+        """`page`: the notes' form; `certificate`: a calibration certificate, PDF or HTML by its name."""
         from catseye.gateways.calibrations.field_report import field_report, mark
 
-        return {"page": SinglePage(mark(self.kind), lambda now, path: field_report(self.report, now), html=True)}
+        page = SinglePage(mark(self.kind), lambda now, path: field_report(self.report, now), html=True)
+        return {"page": page, "certificate": certificate_page(self._certificate())}
 
-    def save_page(self, path: "str | os.PathLike[str]") -> "CertificateResult":
-        """Write the report, to print and sign.
+    def _certificate(self) -> "CertificateFile":
+        from catseye.gateways.calibrations.field_certificate import report_subject
+        from catseye.gateways.certificates.file import CertificateFile
 
-        path   new, or an earlier page of catseye; its name ends in .html
+        return CertificateFile(partial(report_subject, self.report), self.issue)
+
+    def save_page(
+        self, path: "str | os.PathLike[str] | None", certificate: "str | os.PathLike[str] | None" = None
+    ) -> "CertificateResult":
+        """Write the report and the certificate, to print and sign, both or none.
+
+        path          of the report: new, or an earlier page of catseye; its name ends in .html; None: not written
+        certificate   of the certificate, .pdf or .html; None: not written
 
         Returns the result with the name of its page. Raises InputError where nothing can be written.
         """
-        self.save_pages(page=Path(path))
-        return replace(self, page=Path(path))
+        page = None if path is None else Path(path)
+        self.save_pages(page=page, certificate=None if certificate is None else Path(certificate))
+        return replace(self, page=page)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write certificate.html with table and JSON."""
@@ -218,22 +268,31 @@ class CertificateResult(Result):
         return {self.report.file: self.report.sha256} if self.report.file else {}
 
     def sources(self) -> tuple[Path, ...]:
-        """Record that fills the form."""
-        return () if self.read is None else (self.read,)
+        """Record that fills the form, the laboratory's record and the job."""
+        return (*(() if self.read is None else (self.read,)), *self.issue.records.read)
 
 
-def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, blank: bool = False) -> CertificateResult:
+def certificate(
+    kind: str,
+    record: "str | os.PathLike[str] | None" = None,
+    *,
+    blank: bool = False,
+    laboratory: "str | os.PathLike[str] | None" = None,
+    job: "str | os.PathLike[str] | None" = None,
+) -> CertificateResult:
     """Calibration report of a monument or a mirror, filled or blank.
 
     kind     "monument" or "mirror"
     record   record that fills it; None: a blank form
     blank    a blank form, for which there is no record
+    laboratory, job   who issues the certificate, for whom and how (docs/formats/certificates.md)
 
     Raises InputError for a record that cannot be used; ArgumentError: an unknown kind, a blank form with a record.
 
     >>> certificate("monument", "monuments/ZY3.toml").missing[:2]
     ('measured_on', 'by')
     """
+    from catseye.reduction.calibrations.conformity import certificate_issue
     from catseye.reduction.calibrations.field_report import FORMS, blank_report, read_report
 
     if kind not in FORMS:
@@ -248,6 +307,7 @@ def certificate(kind: str, record: "str | os.PathLike[str] | None" = None, *, bl
         keys=tuple(each.entry.key for each in report.fields),
         missing=tuple(entry.key for entry in report.missing),
         report=report,
+        issue=certificate_issue(report.quantities, *certificate_places(laboratory, job)),
         read=path,
     )
 
@@ -263,6 +323,7 @@ class TripletsResult(Result):
     accepted      (n,) bool: |difference| within the memo's 0.15 mm
     conformity_probability   (n,)
     units         everything else: file and reduction of each sheet
+    issue         laboratory and job of a certificate, with statements of conformity
     hashes        SHA-256 of each file
     """
 
@@ -275,10 +336,12 @@ class TripletsResult(Result):
     accepted: np.ndarray
     conformity_probability: np.ndarray
     units: "tuple[tuple[Path, TripletReduction], ...]"
+    issue: "CertificateIssue"
     hashes: dict[Path, str] = field(default_factory=dict)
 
     def passages(self) -> "Sequence[Passage]":
         """The heights, their difference and what is worth knowing, unit by unit."""
+        from catseye.gateways.calibrations.summary import conformity_passages
         from catseye.gateways.triplet.sheet import results
         from catseye.gateways.writers.passage import Passage
 
@@ -286,7 +349,7 @@ class TripletsResult(Result):
         for path, unit in self.units:
             named = [Passage(unit.measurement.triplet, path.name)] if len(self.units) > 1 else []
             passages += [*named, *(Passage(title, text) for title, text in results(unit))]
-        return passages
+        return [*passages, *conformity_passages(self.issue.conformities)]
 
     def sheet(self) -> str:
         """Sheets with every symbol of the memo, as text."""
@@ -321,6 +384,20 @@ class TripletsResult(Result):
 
         return {path.stem: triplet_figure(unit) for path, unit in self.units}
 
+    def pages(self) -> dict[str, SinglePage]:
+        """`certificate` of a single unit, PDF or HTML by its name."""
+        from catseye.gateways.certificates.file import CertificateFile
+
+        return {"certificate": certificate_page(CertificateFile(self._subject, self.issue))}
+
+    def _subject(self) -> "CertifiedSubject":
+        from catseye.gateways.triplet.certificate import triplet_subject
+
+        if len(self.units) != 1:
+            raise InputError(f"certificate: {len(self.units)} sheets were read (expected one, for a certificate each)")
+        [(path, unit)] = self.units
+        return triplet_subject(unit, path.name, self.hashes[path])
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye triplet --out`."""
         from catseye.gateways.triplet.files import refuse_namesakes, write_triplets
@@ -333,14 +410,20 @@ class TripletsResult(Result):
         return {path.name: digest for path, digest in self.hashes.items()}
 
     def sources(self) -> tuple[Path, ...]:
-        """Files of the sheets, which `save` leaves alone."""
-        return tuple(path for path, _ in self.units)
+        """Files that were read, which `save` leaves alone."""
+        return (*(path for path, _ in self.units), *self.issue.records.read)
 
 
-def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) -> TripletsResult:
+def triplet(
+    *files: "str | os.PathLike[str]",
+    laboratory: "str | os.PathLike[str] | None" = None,
+    job: "str | os.PathLike[str] | None" = None,
+    progress: Progress | None = None,
+) -> TripletsResult:
     """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not.
 
     files      sheets of measured units (docs/formats/triplet.md)
+    laboratory, job   who issues the certificate of a single sheet, for whom (docs/formats/certificates.md)
     progress   called with (what, done, of how many)
 
     Raises InputError for a sheet that cannot be used, and without any.
@@ -350,11 +433,15 @@ def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) 
     """
     from catseye.records.files.reading import Folder
     from catseye.records.laboratory.triplet_measurement import TripletMeasurement
+    from catseye.reduction.calibrations.conformity import certificate_issue
+    from catseye.reduction.triplet.certified import triplet_quantities
     from catseye.reduction.triplet.unit import reduce_triplet
     from catseye.verdict import worst
 
     if not files:
         raise InputError("triplet needs a sheet (expected one file or more)")
+    if len(files) > 1 and (laboratory is not None or job is not None):
+        raise ArgumentError("laboratory and job are of one certificate (expected a single sheet)", "job", "laboratory")
     units: list[tuple[Path, TripletReduction]] = []
     hashes: dict[Path, str] = {}
     for done, sheet in enumerate(files):
@@ -365,6 +452,7 @@ def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) 
         units.append((path, reduce_triplet(folder.record(path.name, TripletMeasurement))))
         hashes[path] = folder.hashes[path.name]
     found = [unit for _, unit in units]
+    results = triplet_quantities(found[0]) if len(found) == 1 else ()
     return TripletsResult(
         verdict=worst([unit.verdict for unit in found]),
         names=tuple(unit.measurement.triplet for unit in found),
@@ -376,6 +464,7 @@ def triplet(*files: "str | os.PathLike[str]", progress: Progress | None = None) 
         accepted=np.array([unit.accepted for unit in found]),
         conformity_probability=np.array([unit.conformity_probability for unit in found]),
         units=tuple(units),
+        issue=certificate_issue(results, *certificate_places(laboratory, job)),
         hashes=hashes,
     )
 

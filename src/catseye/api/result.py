@@ -30,14 +30,18 @@ FORMAT = "catseye-result-1"  # of what `save` writes of a result that has no fil
 class SinglePage(NamedTuple):
     """File that a result can write by itself.
 
-    mark   text in its first 4096 bytes that identifies a file of catseye, which may be replaced
-    text   its content, from the time of writing, UTC, and the path
-    html   True: its name ends in .html
+    mark    text that identifies a file of catseye, which may be replaced: in its first 4096 bytes, anywhere in a PDF
+    text    its content, from the time of writing, UTC, and the path
+    html    True: its name ends in .html
+    pdf     True: or in .pdf
+    refuse  raises InputError at that time for a path that may not be written
     """
 
     mark: str
-    text: "Callable[[datetime, Path], str]"
+    text: "Callable[[datetime, Path], str | bytes]"
     html: bool = False
+    pdf: bool = False
+    refuse: "Callable[[datetime, Path], None] | None" = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -93,14 +97,14 @@ class Result:
         """Single files by name, such as a record or a certificate."""
         return {}
 
-    def page_texts(self, names: Mapping[str, str]) -> "dict[str, Callable[[datetime], str]]":
+    def page_texts(self, names: Mapping[str, str]) -> "dict[str, Callable[[datetime], str | bytes]]":
         """Text of single files for `write_files`.
 
         names   file in a directory -> name of `pages`
         """
         pages = self.pages()
 
-        def text(name: str, file: str, now: "datetime") -> str:
+        def text(name: str, file: str, now: "datetime") -> str | bytes:
             return pages[name].text(now, Path(file))
 
         return {file: partial(text, name, file) for file, name in names.items()}
@@ -123,7 +127,7 @@ class Result:
         self,
         directory: Path,
         progress: Progress | None = None,
-        pages: "Mapping[str, Callable[[datetime], str]] | None" = None,
+        pages: "Mapping[str, Callable[[datetime], str | bytes]] | None" = None,
     ) -> None:
         """Write JSON, tables as CSV, figures as SVG, pages; last the provenance.
 
@@ -136,7 +140,7 @@ class Result:
         from catseye.gateways.writers.written import origin, write_files
 
         now = datetime.now(UTC)
-        files: dict[str, Callable[[], str]] = {}
+        files: dict[str, Callable[[], str | bytes]] = {}
         for name, made in (pages or {}).items():
             files[name] = partial(made, now)
         files["result.json"] = lambda: json_page({"format": FORMAT, **_keyed(self.to_object())})
@@ -309,9 +313,11 @@ def _opened(result: Result, paths: "Mapping[str, str | Path | None]", directory:
     _require_pages(named, result.sources(), directory)
     for name, path in named.items():
         if pages[name].html:
-            refuse_suffix(path, name)
+            refuse_suffix(path, name, pdf=pages[name].pdf)
     with ExitStack() as files:
         for name, path in named.items():
+            if (refuse := pages[name].refuse) is not None:
+                refuse(now, path)
             files.enter_context(atomic_file(path, name, pages[name].mark)).append(pages[name].text(now, path))
         yield
 

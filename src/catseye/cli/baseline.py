@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app, uncertainty
+from catseye.cli.commands import Certificate, Job, Json, Laboratory, Quiet, app, uncertainty
 from catseye.cli.networks import Out, _level
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
@@ -148,13 +148,16 @@ class _Provenance(NamedTuple):
     "These files: examples/baselines/busselton"
 )
 @grouped
-def baseline(
+def baseline(  # noqa: PLR0913 - its options are its command line
     *,
     read: _Inputs,
     write: Annotated[
         Path | None,
         typer.Option("--write", metavar="BASELINE.toml", help="Record of the pillars with full covariance to write."),
     ] = None,
+    certificate: Certificate = None,
+    laboratory: Laboratory = None,
+    job: Job = None,
     asked: _Settings,
     origin: _Provenance,
     out: Out = None,
@@ -166,18 +169,20 @@ def baseline(
     from catseye.api.baseline import baseline as calibrated
     from catseye.api.result import require_writable, save
 
-    require_writable(out, *read, record=write)
+    require_writable(out, *read, laboratory, job, record=write, certificate=certificate)
     progress = ProgressLine(quiet)
     try:
-        result = calibrated(**read._asdict(), **asked._asdict(), **origin._asdict(), progress=progress)
+        result = calibrated(
+            **read._asdict(), **asked._asdict(), **origin._asdict(), laboratory=laboratory, job=job, progress=progress
+        )
         if out is not None:
-            save(result, out, progress=progress, record=write)
+            save(result, out, progress=progress, record=write, certificate=certificate)
         else:
-            result.save_pages(record=write)
+            result.save_pages(record=write, certificate=certificate)
     finally:
         progress.clear()
     rows = result.rows() if len(result.pillars) <= FEW else ()
     files = None if out is None else f"{out}/: report.html, pillars.csv, distances.csv, observations.csv, baseline.json"
     record = None if write is None else f"{write}: the pillars with their full covariance"
-    written = [("Written to", files), ("Written to", record)]
+    written = [("Written to", files), ("Written to", record), ("Certificate", certificate)]
     tell(result, json=json, quiet=quiet, strict=strict, rows=rows, written=written)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.commands import Certificate, Job, Json, Laboratory, Quiet, app
 from catseye.cli.results import Strict, tell
 from catseye.cli.vocabularies import CALIBRATION_KINDS, one_of
 
@@ -34,10 +34,9 @@ def calibrate(  # noqa: PLR0913 - its options are its command line
     write: Annotated[
         Path | None, typer.Option("--write", metavar="RECORD.toml", help="Record to write: new, or an earlier one.")
     ] = None,
-    certificate: Annotated[
-        Path | None,
-        typer.Option("--certificate", metavar="PAGE.html", help="Page to sign: new, or an earlier one."),
-    ] = None,
+    certificate: Certificate = None,
+    laboratory: Laboratory = None,
+    job: Job = None,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,
@@ -46,8 +45,9 @@ def calibrate(  # noqa: PLR0913 - its options are its command line
     from catseye.api.laboratory import calibrate as calibrated
     from catseye.api.result import require_writable
 
-    require_writable(None, readings, sheet or readings.with_suffix(".toml"), record=write, certificate=certificate)
-    result = calibrated(kind, readings, sheet, reject=reject)
+    read = (readings, sheet or readings.with_suffix(".toml"), laboratory, job)
+    require_writable(None, *read, record=write, certificate=certificate)
+    result = calibrated(kind, readings, sheet, reject=reject, laboratory=laboratory, job=job)
     result.save_pages(record=write, certificate=certificate)
     written = [("Record", write), ("Certificate", certificate)]
     tell(result, json=json, quiet=quiet, strict=strict, written=written)

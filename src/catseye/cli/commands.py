@@ -114,6 +114,17 @@ Threads = Annotated[
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]
+Certificate = Annotated[
+    Path | None, typer.Option("--certificate", metavar="FILE.pdf", help="Certificate to sign, .pdf or .html.")
+]
+Laboratory = Annotated[
+    Path | None,
+    typer.Option("--laboratory", metavar="LAB.toml", help="Laboratory of the certificate."),
+]
+Job = Annotated[
+    Path | None,
+    typer.Option("--job", metavar="JOB.toml", help="Number, customer, limits of the certificate."),
+]
 
 
 @app.callback(

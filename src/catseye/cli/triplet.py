@@ -1,11 +1,11 @@
 """The command of triplet units measured in the laboratory."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.commands import Certificate, Job, Json, Laboratory, Quiet, app
 from catseye.cli.networks import Out
 from catseye.cli.results import Strict, judge, tell
 from catseye.cli.terminal import ProgressLine, say, wrapped
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     "         catseye triplet examples/triplets/*.toml --out triplet-sheets\n"
     "         catseye triplet --blank sheet.html"
 )
-def triplet(
+def triplet(  # noqa: PLR0913 - its options are its command line
     files: Annotated[
         list[Path] | None,
         typer.Argument(metavar="FILE.toml ...", help="Sheets of measured units: docs/formats/triplet.md."),
@@ -27,6 +27,9 @@ def triplet(
     blank: Annotated[
         Path | None, typer.Option("--blank", metavar="SHEET.html", help="Blank form to write, to print and fill in.")
     ] = None,
+    certificate: Certificate = None,
+    laboratory: Laboratory = None,
+    job: Job = None,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -35,11 +38,12 @@ def triplet(
     """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not."""
     if not files and blank is None:
         raise typer.BadParameter("at least one is needed, or --blank.", param_hint="'FILE.toml ...'")
-    if not files and (out is not None or json):
-        raise typer.BadParameter("are needed with --out and --json.", param_hint="'FILE.toml ...'")
+    if not files and (out is not None or json or certificate is not None):
+        raise typer.BadParameter("are needed with --out, --certificate and --json.", param_hint="'FILE.toml ...'")
     from catseye.api.laboratory import save_triplet_form
 
-    result = _reduced(files, out, quiet) if files else None
+    issue = _Issue(certificate, laboratory, job)
+    result = _reduced(files, out, issue, quiet=quiet) if files else None
     if blank is not None:
         save_triplet_form(blank)
     blanks = None if blank is None else f"{blank}: the blank form"
@@ -48,28 +52,38 @@ def triplet(
             say(wrapped("Written to", str(blanks)))
         return
     files_of = None if out is None else f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"
-    written = [("Written to", files_of), ("Written to", blanks)]
+    written = [("Written to", files_of), ("Certificate", certificate), ("Written to", blanks)]
     if len(result.units) == 1 and not json and not quiet:
         say(result.sheet())
         for title, text in written:
             if text is not None:
-                say(wrapped(title, text))
+                say(wrapped(title, str(text)))
         judge(result.verdict, strict=strict)
         return
     tell(result, json=json, quiet=quiet, strict=strict, written=written)
 
 
-def _reduced(files: list[Path], out: Path | None, quiet: bool) -> "TripletsResult":
+class _Issue(NamedTuple):
+    """Certificate to write, its laboratory and its job."""
+
+    certificate: Path | None
+    laboratory: Path | None
+    job: Path | None
+
+
+def _reduced(files: list[Path], out: Path | None, issue: _Issue, *, quiet: bool) -> "TripletsResult":
     """Sheets reduced, in order; with an `out`, written whole or not."""
     from catseye.api.laboratory import triplet as reduced
     from catseye.api.result import require_writable, save
 
-    require_writable(out, *files)
+    require_writable(out, *files, issue.laboratory, issue.job, certificate=issue.certificate)
     progress = ProgressLine(quiet)
     try:
-        result = reduced(*files, progress=progress)
+        result = reduced(*files, laboratory=issue.laboratory, job=issue.job, progress=progress)
         if out is not None:
-            save(result, out, progress=progress)
+            save(result, out, progress=progress, certificate=issue.certificate)
+        else:
+            result.save_pages(certificate=issue.certificate)
     finally:
         progress.clear()
     return result

@@ -10,11 +10,16 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.gateways.calibrations.certificate import _cell, _form, certificate, rounded
-from catseye.gateways.calibrations.certificate_record import MARK, calibration_object, calibration_toml
+from catseye.gateways.calibrations.calibration_certificate import _cell, _form, calibration_subject
+from catseye.gateways.calibrations.certificate_record import MARK, QUANTITY, calibration_object, calibration_toml
+from catseye.gateways.calibrations.summary import rounded
+from catseye.gateways.certificates.page import certificate_html
+from catseye.gateways.certificates.rounding import rounded_result
+from catseye.gateways.certificates.statement import certificate_document
 from catseye.gateways.writers.objects import json_line
 from catseye.records.files.reading import read_record
 from catseye.records.laboratory.calibration import CalibrationRecord
+from catseye.records.laboratory.certificate_job import CertificateRecords
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.calibrations.kinds import calibrate
 from repository import ROOT
@@ -22,6 +27,11 @@ from repository import ROOT
 EXAMPLES = ROOT / "examples" / "calibrations"
 MINE = ("reference-distance", "leakage", "leakage-lit", "linearity", "retroreflector", "amplitude-to-phase")
 WHEN = datetime(2026, 9, 2, 10, 0, tzinfo=UTC)
+
+
+def certificate(calibration, when):
+    """Page of a calibration without a laboratory or a job."""
+    return certificate_html(certificate_document(calibration_subject(calibration), CertificateRecords(), (), when))
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +52,7 @@ def test_a_record_reads_back_as_it_was(made, tmp_path, kind):
     found = made(kind)
     (tmp_path / "r.toml").write_text(calibration_toml(found), encoding="utf-8")
     record = read_record(tmp_path / "r.toml", CalibrationRecord)
-    assert [dict(q) for q in record.quantity] == [vars(q) for q in found.quantities]
+    assert [dict(q) for q in record.quantity] == [{key: getattr(q, key) for key in QUANTITY} for q in found.quantities]
     np.testing.assert_array_equal(record.covariance.matrix, found.covariance)
     assert record.record == found.record
     assert record.measured_on == found.provenance["measured_on"] == date(2026, 9, 1)
@@ -79,13 +89,12 @@ def test_a_page_shows_every_quantity_test_and_line_to_sign(made, kind):
     found = made(kind)
     text = certificate(found, WHEN)
     for q in found.quantities:
-        value, u = rounded(q.value, q.u)
-        assert f">{value}</td>" in text
-        assert f">{u}</td>" in text
+        for number in rounded_result(q.value, q.u, q.coverage):
+            assert f">{number}</td>" in text
     assert text.count("date, signature") == 3
     assert text.count("<tr>") > len(found.rows)
     assert "http" not in text.replace("http://www.w3.org", "")  # stands alone
-    for word in ("2026-09-01", "2028-09-01", "example-103", found.provenance["inputs_sha256"][f"{kind}.csv"]):
+    for word in ("2026-09-01", "2026-09-02", "example-103", found.provenance["inputs_sha256"][f"{kind}.csv"]):
         assert word in text
     assert certificate(found, WHEN) == text
 

@@ -16,6 +16,7 @@ from catseye.version import __version__
 
 FORMAT = "catseye-calibration-1"
 MARK = f'format = "{FORMAT}"'  # identifies a file of catseye
+QUANTITY = ("key", "value", "u", "unit", "meaning", "coverage")
 BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -71,7 +72,7 @@ def calibration_toml(calibration: Calibration) -> str:
     lines = [MARK, *_pairs(head)]
     lines += ["", "# to copy into the instrument's record", *_table("record", calibration.record)]
     for q in calibration.quantities:
-        lines += ["", "[[quantity]]", *_pairs(vars(q))]
+        lines += ["", "[[quantity]]", *_pairs({name: getattr(q, name) for name in QUANTITY})]
     matrix = ",\n".join(f"  {_value([float(v) for v in row])}" for row in np.atleast_2d(calibration.covariance))
     lines += [
         "",

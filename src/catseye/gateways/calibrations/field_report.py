@@ -7,13 +7,13 @@ from html import escape
 import numpy as np
 
 from catseye.constants import DEGREE
-from catseye.gateways.calibrations.certificate import SIGNATURES
 from catseye.gateways.calibrations.field_report_fields import (
     written_aid,
     written_matrix,
     written_u,
     written_value,
 )
+from catseye.gateways.certificates.statement import SIGNATURES
 from catseye.gateways.writers.page import page
 from catseye.geometry.mirror.mount import gamma, lambda_
 from catseye.reduction.calibrations.field_report import FORMS, Report, ReportField

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE
-from catseye.gateways.calibrations.certificate import rounded
+from catseye.gateways.calibrations.summary import rounded
 from catseye.gateways.writers.passage import Passage
 from catseye.reduction.calibrations.field_report import FORMS, Report, ReportField
 

@@ -13,6 +13,7 @@ from catseye.interruption import Unfinished, deferred, undo_on_interruption
 
 PROVENANCE = "provenance.json"
 PAGES = (".html", ".htm")
+PDF = b"%PDF"  # first bytes of one
 FORMAT = "catseye-reduction-1"  # identifies a directory of catseye, which may be replaced; so do the next
 FORMATS = (
     FORMAT,
@@ -151,10 +152,10 @@ def _replace(where: Path, fresh: Path, old: Path) -> None:
 
 
 @contextmanager
-def atomic_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
-    """Write a text file atomically from the pieces that the block appends to the list.
+def atomic_file(path: Path, option: str, mark: str) -> Iterator[list[str | bytes]]:
+    """Write a file atomically from the pieces that the block appends to the list.
 
-    path     as the user wrote it: new, or an earlier file of catseye, one that holds `mark` in its first 4096 bytes
+    path     as the user wrote it: new, or an earlier file of catseye, one that holds `mark` where `holds` looks
     option   command option that named the file, for messages
     mark     text that identifies catseye's files, such as format = "catseye-baseline-1"
 
@@ -162,12 +163,12 @@ def atomic_file(path: Path, option: str, mark: str) -> Iterator[list[str]]:
     """
     where = path.resolve()
     fresh = where.parent / f".catseye-{secrets.token_hex(6)}"
-    pieces: list[str] = []
+    pieces: list[str | bytes] = []
     with undo_on_interruption(Unfinished(str(fresh))):
         try:
             refuse_file(path, option, mark)
             yield pieces
-            fresh.write_text("".join(pieces), encoding="utf-8")
+            fresh.write_bytes(b"".join(p if isinstance(p, bytes) else p.encode("utf-8") for p in pieces))
             with deferred():
                 os.replace(fresh, where)
         except OSError as problem:
@@ -181,16 +182,28 @@ def refuse_file(path: Path, option: str, mark: str) -> None:
     where = path.resolve()
     if where.is_dir():
         raise InputError(f"{option} {path}: is a directory (expected the name of a file)")
-    if where.exists():
-        with where.open("rb") as stream:
-            if mark.encode() not in stream.read(4096):
-                raise InputError(f"{option} {path}: exists and is not a catseye file (expected a new name)")
+    if where.exists() and not holds(where, mark):
+        raise InputError(f"{option} {path}: exists and is not a catseye file (expected a new name)")
 
 
-def refuse_suffix(path: Path, option: str) -> None:
-    """Raise InputError for a page's name whose suffix is not HTML."""
+def holds(file: Path, mark: str) -> bool:
+    """True if a file holds a mark in its first 4096 bytes, or anywhere in a PDF, whose metadata come last."""
+    with file.open("rb") as stream:
+        content = stream.read(4096)
+        if content.startswith(PDF):
+            content += stream.read()
+    return mark.encode() in content
+
+
+def refuse_suffix(path: Path, option: str, *, pdf: bool = False) -> None:
+    """Raise InputError for a page's name whose suffix is not HTML.
+
+    pdf   True: nor PDF
+    """
     suffix = path.suffix.lower()
-    if suffix not in PAGES and not path.is_dir():
+    if pdf and suffix not in (".pdf", *PAGES) and not path.is_dir():
+        raise InputError(f"{option} {path}: a certificate is PDF or HTML (expected a name that ends in .pdf or .html)")
+    if not pdf and suffix not in PAGES and not path.is_dir():
         hint = "; a browser prints a page as PDF" if suffix == ".pdf" else ""
         raise InputError(f"{option} {path}: a page is HTML (expected a name that ends in .html{hint})")
 

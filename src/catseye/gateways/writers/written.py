@@ -13,7 +13,7 @@ from catseye.aliases import Progress
 from catseye.gateways.writers.objects import json_page, versions
 from catseye.gateways.writers.output import PROVENANCE
 
-Files = Mapping[str, Callable[[], str | Iterable[str] | Iterable[bytes]]]
+Files = Mapping[str, Callable[[], str | bytes | Iterable[str] | Iterable[bytes]]]
 
 
 def origin(when: datetime, inputs: Mapping[str, str]) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def write_files(
         digest = hashlib.sha256()
         text = page()
         with (directory / name).open("wb") as stream:
-            for piece in (text,) if isinstance(text, str) else text:
+            for piece in (text,) if isinstance(text, str | bytes) else text:
                 raw = piece if isinstance(piece, bytes) else piece.encode("utf-8")
                 digest.update(raw)
                 stream.write(raw)

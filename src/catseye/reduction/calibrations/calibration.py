@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from catseye.reduction.calibrations.budget import Contribution
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit
 from catseye.verdict import Verdict
@@ -27,6 +28,8 @@ class Quantity:
     unit     for people: "mm"
     meaning  one line for the certificate
     coverage factor k of the interval value ± k u that holds it with 95.45 %: 2, more where u rests on few readings
+    budget   contributions to u, which add in quadrature
+    degrees  of freedom of u, effective
     """
 
     key: str
@@ -35,6 +38,8 @@ class Quantity:
     unit: str
     meaning: str
     coverage: float = 2.0
+    budget: tuple[Contribution, ...] = ()
+    degrees: float = float("inf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +65,7 @@ class Calibration:
     equal_axes   the figure is a plane: both axes to one scale
     fit          the adjustment, or None
     explained    share of the readings' variance that the model explains, without a fit
+    conditions   lowest and highest temperature_c, pressure_hpa, humidity_percent of the readings, where stated
     plausible    its numbers against the limits of the kind's instruments, by `plausibility.judged`
     """
 
@@ -82,6 +88,7 @@ class Calibration:
     fit: CalibrationFit | None = None
     explained: float = float("nan")
     plausible: tuple[CheckOutcome, ...] = ()
+    conditions: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def states(self) -> tuple[str, ...]:

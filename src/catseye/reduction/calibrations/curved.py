@@ -38,12 +38,14 @@ class ModelParameter:
     start    start of the search; the prior value if there is one
     step     of the numerical derivatives, in its unit
     u        standard uncertainty of that value; infinite for a free parameter, zero holds it
+    unit     of it, for the certificate
     """
 
     name: str
     start: float
     step: float
     u: float = np.inf
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,12 @@ class CurvedFit:
         """Index of a parameter; ValueError for another name."""
         return [p.name for p in self.parameters].index(name)
 
+    @property
+    def uncertain(self) -> list[int]:
+        """Numbers of the parameters that the fit has, in its order: free ones, then those with a prior."""
+        free = [k for k, p in enumerate(self.parameters) if np.isinf(p.u)]
+        return free + [k for k, p in enumerate(self.parameters) if 0.0 < p.u < np.inf]
+
     def value(self, name: str) -> float:
         """Estimate of a parameter by its name."""
         return float(self.values[self.index(name)])
@@ -84,11 +92,9 @@ class CurvedFit:
         at = [self.index(name) for name, *_ in selection]
         scale = np.array([1.0 / size for *_, size in selection])
         covariance = self.covariance[np.ix_(at, at)] * np.outer(scale, scale)
-        sought = [k for k, p in enumerate(self.parameters) if np.isinf(p.u)]
-        turn = np.array([[s * (k == j) for j in sought] for k, s in zip(at, scale, strict=True)])
+        turn = np.array([[s * (k == j) for j in self.uncertain] for k, s in zip(at, scale, strict=True)])
         keys = [(key, unit, meaning) for _, key, unit, meaning, _ in selection]
-        fit = self.fit if sought else None
-        return quantities(keys, self.values[at] * scale, covariance, fit=fit, turn=turn), covariance
+        return quantities(keys, self.values[at] * scale, covariance, fit=self.fit, turn=turn), covariance
 
 
 def fit_curved(
@@ -125,7 +131,7 @@ def fit_curved(
             scatter,
             names=[p.name for p in parameters if np.isinf(p.u)],
             effects=[
-                Effect(p.name, slopes[:, k], p.u) for k, p in enumerate(parameters) if acting[k]
+                Effect(p.name, slopes[:, k], p.u, p.unit) for k, p in enumerate(parameters) if acting[k]
             ],
             options=replace(options, reject=rejecting),
         )  # fmt: skip

@@ -14,6 +14,8 @@ from catseye.geometry.mirror.mount import gamma, lambda_
 from catseye.records.files.reading import Folder
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
+from catseye.reduction.calibrations.budget import UNSTATED, Contribution, combined, significant
+from catseye.reduction.calibrations.calibration import Quantity
 from catseye.verdict import Verdict
 
 U_OF_ANY_PHASE = math.pi / math.sqrt(3.0)  # rad: unknown angle, uniform over a turn
@@ -60,11 +62,15 @@ class Form:
 
 @dataclass(frozen=True)
 class ReportField:
-    """Field with value and u from the record; None: missing."""
+    """Field with value and u from the record; None: missing.
+
+    budget   contributions to u
+    """
 
     entry: ReportEntry
     value: FieldValue = None
     u: float | None = None
+    budget: tuple[Contribution, ...] = ()
 
     @property
     def number(self) -> float | None:
@@ -95,6 +101,22 @@ class Report:
     def missing(self) -> tuple[ReportEntry, ...]:
         """Entries missing in the record; empty for a blank form."""
         return tuple(field.entry for field in self.fields if field.value is None) if self.file else ()
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Measured numbers, with u = 0 where held and nan where the record has none; settings are integers."""
+        return tuple(
+            Quantity(
+                key=field.entry.key,
+                value=field.value,
+                u=math.nan if field.u is None else field.u,
+                unit=field.entry.unit,
+                meaning=", ".join(filter(None, (field.entry.name, field.entry.sense))),
+                budget=field.budget,
+            )
+            for field in self.fields
+            if isinstance(field.value, float)
+        )
 
     @property
     def verdict(self) -> Verdict:
@@ -229,8 +251,16 @@ def blank_report(kind: str) -> Report:
 
 def _filled(form: Form, record: Reported | None) -> tuple[ReportField, ...]:
     """Fields of the form, the matrix last."""
-    stated = [ReportField(e, getattr(record, e.key, None), _uncertainty(e, record)) for e in form.entries]
-    return (*stated, *_matrix(form, record))
+    stated = [(e, getattr(record, e.key, None), _uncertainty(e, record)) for e in form.entries]
+    fields = [ReportField(e, value, u, _stated(e, u)) for e, value, u in stated]
+    return (*fields, *_matrix(form, record))
+
+
+def _stated(entry: ReportEntry, u: float | None) -> tuple[Contribution, ...]:
+    """Budget of a stated uncertainty: the record has no more than its size."""
+    if not u:
+        return ()
+    return (Contribution("u as the record states it", u, entry.unit or "1", "B", UNSTATED, math.inf, 1.0),)
 
 
 def _uncertainty(entry: ReportEntry, record: Reported | None) -> float | None:
@@ -260,8 +290,16 @@ def _matrix(form: Form, record: Reported | None) -> tuple[ReportField, ...]:
     values = form.turned(*angles).ravel()
     if any(value is None for value in u):
         return tuple(ReportField(e, float(value)) for e, value in zip(entries, values, strict=True))
-    spread = matrix_uncertainty(form.turned, angles, np.array(u, dtype=float)).ravel()
-    return tuple(ReportField(e, float(v), float(s)) for e, v, s in zip(entries, values, spread, strict=True))
+    sizes = np.array(u, dtype=float)
+    slopes = matrix_slopes(form.turned, angles).reshape(len(angles), -1)
+    fields = []
+    for number, (entry, value) in enumerate(zip(entries, values, strict=True)):
+        rows = [
+            Contribution(key, float(size), "rad", "B", UNSTATED, math.inf, float(slope))
+            for key, size, slope in zip(form.angles, sizes, slopes[:, number], strict=True)
+        ]
+        fields.append(ReportField(entry, float(value), combined(rows), significant(rows)))
+    return tuple(fields)
 
 
 def matrix_uncertainty(turned: Callable[..., np.ndarray], angles: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -274,6 +312,14 @@ def matrix_uncertainty(turned: Callable[..., np.ndarray], angles: np.ndarray, u:
     Source: [JCGM100] eq. 10. The derivatives are exact: in each angle t an element is a cos t + b sin t + c, whose
     derivative is half the difference of its values at t ± a quarter turn.
     """
+    return np.sqrt(np.einsum("k,kij->ij", u**2, matrix_slopes(turned, angles) ** 2))
+
+
+def matrix_slopes(turned: Callable[..., np.ndarray], angles: np.ndarray) -> np.ndarray:
+    """Derivatives (n, 3, 3) of a rotation matrix's elements by its n angles, exact.
+
+    turned    function from the angles to the matrix
+    angles    (n,), rad
+    """
     quarter = 0.5 * math.pi * np.eye(len(angles))
-    slopes = np.array([0.5 * (turned(*(angles + q)) - turned(*(angles - q))) for q in quarter])
-    return np.sqrt(np.einsum("k,kij->ij", u**2, slopes**2))
+    return np.array([0.5 * (turned(*(angles + q)) - turned(*(angles - q))) for q in quarter])

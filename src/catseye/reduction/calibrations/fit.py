@@ -14,8 +14,9 @@ from catseye.errors import EstimationError
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.estimation.quality.reliability import checked, global_test, single_level, tau_critical, w_critical
+from catseye.reduction.calibrations.budget import CovarianceParts
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
-from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood
+from catseye.reduction.calibrations.scatter import effective_degrees, restricted_likelihood, variance_information
 
 TESTS = 3  # that share the level evenly: scatter, single readings, tests of the kind
 SCATTER_LIMIT = 0.05 / TESTS  # level of the test of the variance factor, two-sided
@@ -30,11 +31,13 @@ class Effect:
     name     for the certificate
     column   (m,) change of the observed values for each unit of it
     u        its standard uncertainty, in that unit; zero omits it
+    unit     of it, for the certificate
     """
 
     name: str
     column: np.ndarray
     u: float
+    unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +71,7 @@ class CalibrationFit:
     variance_factor, degrees_of_freedom   NaN and the degrees where the scatter was estimated: it would be 1
     effective         (p,) degrees of freedom of each parameter's scattered variance; infinite where scatter is claimed
     independent       True if the readings' scatters are independent
+    parts             the covariance by its causes, effects included
     """
 
     x: np.ndarray
@@ -87,6 +91,7 @@ class CalibrationFit:
     degrees_of_freedom: float
     effective: np.ndarray
     independent: bool
+    parts: CovarianceParts
 
     @property
     def explained(self) -> float:
@@ -259,13 +264,46 @@ def _fitted(
         block = np.ix_(on, on)
         acting_on = [q[block] for q in scatter.unknown.values()]  # one estimated as zero is no less uncertain
         degrees = effective_degrees(design[on], acting_on, covariance[block])
-    return _outcome(solution, groups[0], [e.name for e in acting], components, on=on, level=level, effective=degrees)
+    parts = _parts(solution.covariance, groups[0], scatter, components, on=on, acting=acting)
+    return _outcome(solution, groups[0], parts, components, on=on, level=level, effective=degrees)
+
+
+def _parts(
+    full: np.ndarray,
+    readings: Linear,
+    scatter: ObservedScatter,
+    components: dict[str, float],
+    *,
+    on: np.ndarray,
+    acting: Sequence[Effect],
+) -> CovarianceParts:
+    """Covariance of parameters and effects by its causes.
+
+    The estimate is linear in the readings and in the effects' priors, which are independent: the parts add up.
+    """
+    block, wide = np.ix_(on, on), readings.matrix[on]
+    gain = full @ np.linalg.solve(readings.covariance[block], wide).T
+    u = np.array([e.u for e in acting])
+    free = wide.shape[1] - len(acting)
+    pulled = {name: scatter.unknown[name][block] for name in components}
+    total = readings.covariance[block] + (wide[:, free:] * u**2) @ wide[:, free:].T
+    claimed = scatter.claimed[block]
+    return CovarianceParts(
+        effects=tuple(e.name for e in acting),
+        u=u,
+        units=tuple(e.unit for e in acting),
+        covariance=full,
+        claimed=gain @ claimed @ gain.T,
+        estimated={name: gain @ matrix @ gain.T for name, matrix in pulled.items()},
+        variances=np.array(list(components.values())) ** 2,
+        information=variance_information(wide[:, :free], list(pulled.values()), total),
+    )
 
 
 def _outcome(
     solution: LeastSquaresSolution,
     readings: Linear,
-    acting: Sequence[str],
+    parts: CovarianceParts,
     components: dict[str, float],
     *,
     on: np.ndarray,
@@ -289,7 +327,9 @@ def _outcome(
         x=solution.x[:p],
         covariance=full[:p, :p],
         scattered=scattered,
-        effects={name: (float(solution.x[p + k]), float(np.sqrt(full[p + k, p + k]))) for k, name in enumerate(acting)},
+        effects={
+            name: (float(solution.x[p + k]), float(np.sqrt(full[p + k, p + k]))) for k, name in enumerate(parts.effects)
+        },
         components=components,
         residual=group.residual,
         predicted=design @ solution.x[:p],
@@ -303,4 +343,5 @@ def _outcome(
         degrees_of_freedom=degrees,
         effective=effective,
         independent=not np.any(readings.covariance - np.diag(np.diag(readings.covariance))),
+        parts=parts,
     )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from catseye.records.files.readings import SheetLayout, SheetReadings
+from catseye.reduction.calibrations.budget import SharedInput, significant, welch_satterthwaite
 from catseye.reduction.calibrations.calibration import Calibration, Quantity
 from catseye.reduction.calibrations.fit import CalibrationFit
 
@@ -112,27 +113,39 @@ def quantities(
     *,
     fit: CalibrationFit | None = None,
     turn: np.ndarray | None = None,
+    inputs: Sequence[SharedInput] = (),
 ) -> tuple[Quantity, ...]:
-    """Quantities from (key, unit, meaning), values and covariance.
+    """Quantities from (key, unit, meaning), values and covariance, each with its budget.
 
     In the units of the keys.
 
-    fit, turn   their source, and the derivatives (q, p) by its parameters: the part of u that was estimated from
-                few readings widens the interval
+    fit, turn   their source, and the derivatives (n, p) by its parameters, or (n, p + q) by its effects, too
+    inputs      further sources, independent of the fit
 
-    Source: [JCGM100] G.4.1, Welch and Satterthwaite; the scatter's own degrees by `effective_degrees`.
+    Source: [JCGM100] G.4.1, Welch and Satterthwaite; the scatter's own degrees by `CovarianceParts`.
     """
-    variance = np.diag(covariance)
-    coverage = np.full(len(variance), 2.0)
-    if fit is not None and np.isfinite(fit.effective).any():
-        slope = np.eye(len(variance)) if turn is None else np.asarray(turn, dtype=float)
-        estimated = np.einsum("qp,pr,qr->q", slope, fit.scattered, slope)
-        least = np.array([np.min(fit.effective[row != 0.0], initial=np.inf) for row in slope])
-        coverage = student(least * (variance / np.maximum(estimated, 1e-300)) ** 2, 2.0)
-    return tuple(
-        Quantity(key=key, value=float(v), u=float(np.sqrt(s)), unit=unit, meaning=meaning, coverage=float(k))
-        for (key, unit, meaning), v, s, k in zip(keys, values, variance, coverage, strict=True)
-    )
+    calibrated = []
+    for number, ((key, unit, meaning), value, variance) in enumerate(
+        zip(keys, values, np.diag(covariance), strict=True)
+    ):
+        rows = [each.contribution(number, unit) for each in inputs]
+        if fit is not None:
+            slope = np.eye(len(values))[number] if turn is None else np.asarray(turn, dtype=float)[number]
+            rows = [*fit.parts.contributions(slope, unit), *rows]
+        degrees = welch_satterthwaite(rows)
+        calibrated.append(
+            Quantity(
+                key=key,
+                value=float(value),
+                u=float(np.sqrt(variance)),
+                unit=unit,
+                meaning=meaning,
+                coverage=float(student(degrees, 2.0)),
+                budget=significant(rows),
+                degrees=degrees,
+            )
+        )
+    return tuple(calibrated)
 
 
 def student(degrees: ArrayLike, deviations: float) -> np.ndarray:

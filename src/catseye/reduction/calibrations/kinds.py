@@ -1,9 +1,10 @@
 """Kinds of calibrations: one file with a RECIPE and one line here each."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from catseye.errors import InputError
-from catseye.records.files.readings import read_readings
+from catseye.records.files.readings import SheetReadings, read_readings
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.kind import CalibrationKind
 from catseye.reduction.calibrations.length import gauge_blocks, height_gauge, invar_wire
@@ -33,6 +34,7 @@ from catseye.reduction.calibrations.ranging import (
     retroreflector,
 )
 
+WEATHER = ("temperature_c", "pressure_hpa", "humidity_percent")
 KINDS: dict[str, CalibrationKind] = {
     "reference-distance": reference_distance.RECIPE,
     "leakage": leakage.RECIPE,
@@ -79,4 +81,12 @@ def calibrate(kind: str, path: Path | str, sheet: Path | str | None = None, *, r
         raise InputError(f"calibration {kind!r} is unknown (expected one of {', '.join(KINDS)})")
     chosen = KINDS[kind]
     readings = read_readings(path, chosen.layout, sheet)
-    return judged(chosen, readings, chosen.recipe(readings, reject))
+    found = judged(chosen, readings, chosen.recipe(readings, reject))
+    return replace(found, conditions=_conditions(readings))
+
+
+def _conditions(readings: SheetReadings) -> dict[str, tuple[float, float]]:
+    """Lowest and highest weather of the readings in use, where table or sheet has it."""
+    used = readings.active
+    spans = {name: readings.get(name)[used] for name in WEATHER if readings.has(name)}
+    return {name: (float(values.min()), float(values.max())) for name, values in spans.items()}

@@ -121,9 +121,22 @@ def effective_degrees(design: np.ndarray, components: Sequence[np.ndarray], cova
     weight = np.linalg.inv(covariance)
     inverse = np.linalg.inv(design.T @ weight @ design)
     gain = inverse @ design.T @ weight
-    projection = weight - weight @ design @ gain
-    pulled = [projection @ q for q in components]
-    information = np.array([[np.sum(a * b.T) for b in pulled] for a in pulled])
+    information = variance_information(design, components, covariance)
     slope = np.stack([np.einsum("pi,ij,pj->p", gain, q, gain) for q in components])
     spread = 2.0 * np.einsum("kp,kl,lp->p", slope, np.linalg.pinv(information), slope)
     return 2.0 * np.diag(inverse) ** 2 / spread
+
+
+def variance_information(design: np.ndarray, components: Sequence[np.ndarray], covariance: np.ndarray) -> np.ndarray:
+    """Matrix (k, k) of tr(P Q_k P Q_l): twice its inverse is the factors' covariance.
+
+    design       (m, p)
+    components   k matrices Q (m, m) whose factors were estimated
+    covariance   (m, m) with these factors
+
+    Source: [PATTERSON71] (information of restricted maximum likelihood).
+    """
+    weight = np.linalg.inv(covariance)
+    projection = weight - weight @ design @ np.linalg.solve(design.T @ weight @ design, design.T @ weight)
+    pulled = [projection @ q for q in components]
+    return np.array([[np.sum(a * b.T) for b in pulled] for a in pulled])

@@ -38,7 +38,7 @@ class TripletReduction:
     chi_square, degrees_of_freedom, p   of all placements agreeing; p NaN with one
     suspects                       placements, counted from 0, contradicted by the others; named, not dropped
     h_corr_without_suspects        NaN without suspects, or without others
-    budget                         group of inputs -> its share in u_h_corr, m
+    budget                         group of inputs -> its share in u_h_corr, m; l_mpbc_budget, difference_budget alike
     steps, u_steps                 (k,) place of the stops by ranging less the first placement's: 0 if spacers fit
     air_in_glass                   m, to be added to h_corr if the index ratio of the sheet belongs to 20 °C, 933 hPa,
                                    50 %; 0 where the sheet gives the index of the glass
@@ -73,6 +73,8 @@ class TripletReduction:
     suspects: tuple[int, ...]
     h_corr_without_suspects: float
     budget: dict[str, float]
+    l_mpbc_budget: dict[str, float]
+    difference_budget: dict[str, float]
     steps: Array
     u_steps: Array
     air_in_glass: float

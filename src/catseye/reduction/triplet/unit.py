@@ -90,6 +90,8 @@ def reduce_triplet(measurement: TripletMeasurement) -> TripletReduction:
             combined(lengths.h_corr, covariance, consistent).value if best.suspects and len(consistent) else math.nan
         ),
         budget=_budget(shares, share) if valid else {},
+        l_mpbc_budget=_budget(shares, shares.l_mpbc),
+        difference_budget=_budget(shares, share - shares.l_mpbc) if valid else {},
         steps=steps,
         u_steps=u_steps,
         air_in_glass=_air_in_glass(measurement, readings, best.weights),
@@ -271,7 +273,7 @@ def _standardised(values: Array, covariance: Array, used: NDArray[np.intp]) -> A
 
 
 def _budget(shares: TripletShares, share: Array) -> dict[str, float]:
-    """Contribution of each group to the uncertainty of h_corr, m."""
+    """Contribution of each group to an uncertainty, m, from those of its inputs (q,)."""
     budget: dict[str, float] = {}
     for group, value in zip(shares.groups, share, strict=True):
         budget[group] = math.hypot(budget.get(group, 0.0), float(value))

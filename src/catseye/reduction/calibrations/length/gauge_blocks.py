@@ -126,10 +126,10 @@ def calibrate_against_blocks(readings: SheetReadings, reject: bool = False) -> C
         names=["zero", "scale"][: 1 + sheet.estimate_scale],
         effects=[  # of reads - L: a longer stack makes it smaller
             *(
-                Effect(f"block {block.name}, mm", -used[:, k] * expansion, block.u_mm)
+                Effect(f"block {block.name}", -used[:, k] * expansion, block.u_mm, "mm")
                 for k, block in enumerate(sheet.block)
             ),
-            Effect("film, µm", -films * expansion * 1e-3, sheet.u_film_um),
+            Effect("film", -films * expansion * 1e-3, sheet.u_film_um, "µm"),
             *_temperature_effects(sheet, -cold, temperature),
         ],
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
@@ -181,8 +181,8 @@ def calibrate_spacers(readings: SheetReadings, reject: bool = False) -> Calibrat
         _scatter(sheet, m),
         names=names,
         effects=[
-            Effect("zero of the instrument, mm", -np.ones(m), sheet.u_zero_mm),
-            Effect("scale of the instrument, ppm", -observed * PPM, sheet.u_scale_ppm),
+            Effect("zero of the instrument", -np.ones(m), sheet.u_zero_mm, "mm"),
+            Effect("scale of the instrument", -observed * PPM, sheet.u_scale_ppm, "ppm"),
             *_temperature_effects(sheet, observed, temperature),
         ],
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
@@ -231,8 +231,8 @@ def _temperature_effects(sheet: LengthSheet, length: np.ndarray, temperature: np
     observed value that holds it (with the sign of `length`) moves accordingly; only the size matters to a prior.
     """
     return [
-        Effect("offset of the thermometer, °C", length * sheet.expansion_ppm_per_c * PPM, sheet.u_temperature_c),
-        Effect("expansion, ppm/°C", length * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c),
+        Effect("offset of the thermometer", length * sheet.expansion_ppm_per_c * PPM, sheet.u_temperature_c, "°C"),
+        Effect("expansion", length * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c, "ppm/°C"),
     ]
 
 

@@ -224,20 +224,24 @@ def _parameters(
                 f"{name}_mm is missing (expected with u_offset_mm, as no set-up of {readings.file} has {name[1]} up)",
             )
         else:
-            offsets.append(ModelParameter(name, value, 1e-2, sheet.u_offset_mm))
+            offsets.append(ModelParameter(name, value, 1e-2, sheet.u_offset_mm, "mm"))
     lean, seating = sheet.u_lean_arcsec * ARCSECOND, sheet.u_seating_arcsec * ARCSECOND
     shared = [
         *offsets,
-        ModelParameter("ball diameter", sheet.ball_diameter_mm or 0.0, 1e-2, sheet.u_ball_diameter_mm),
-        ModelParameter("mirror diameter", sheet.mirror_diameter_mm or 0.0, 1e-2, sheet.u_mirror_diameter_mm),
-        *(ModelParameter(f"{axis} set-ups lean {direction}", 0.0, 1e-4, lean) for axis in AXES for direction in WAYS),
-        ModelParameter("film", 0.0, 1e-3, sheet.u_film_um * 1e-3),
-        ModelParameter("scale", 0.0, 1e-4, sheet.u_scale_ppm * PPM),
+        ModelParameter("ball diameter", sheet.ball_diameter_mm or 0.0, 1e-2, sheet.u_ball_diameter_mm, "mm"),
+        ModelParameter("mirror diameter", sheet.mirror_diameter_mm or 0.0, 1e-2, sheet.u_mirror_diameter_mm, "mm"),
+        *(
+            ModelParameter(f"{axis} set-ups lean {direction}", 0.0, 1e-4, lean, "rad")
+            for axis in AXES
+            for direction in WAYS
+        ),
+        ModelParameter("film", 0.0, 1e-3, sheet.u_film_um * 1e-3, "mm"),
+        ModelParameter("scale", 0.0, 1e-4, sheet.u_scale_ppm * PPM, "1"),
     ]
     for k, setup in enumerate(setups):
         shared.append(ModelParameter(f"zero of {setup}", float(np.mean(observed[which == k])), 1e-2))
-        shared += [ModelParameter(f"{setup} leans {direction}", 0.0, 1e-4, seating) for direction in WAYS]
-    return shared + [ModelParameter(f"block {block.name}", 0.0, 1e-3, block.u_mm) for block in sheet.block]
+        shared += [ModelParameter(f"{setup} leans {direction}", 0.0, 1e-4, seating, "rad") for direction in WAYS]
+    return shared + [ModelParameter(f"block {block.name}", 0.0, 1e-3, block.u_mm, "mm") for block in sheet.block]
 
 
 def _calibration(readings: SheetReadings, solution: CurvedFit, sought: list[str]) -> Calibration:

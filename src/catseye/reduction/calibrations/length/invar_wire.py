@@ -45,14 +45,14 @@ STEPS = {  # of the numerical derivatives: sizes over which the chord is straigh
     "expansion_ppm_per_c": 0.1,
 }
 SHARED = {  # whose offset all readings share
-    "certified_mm": "certified length of the wire, mm",
-    "tension_n": "offset of the tension, N",
-    "temperature_c": "offset of the thermometer, °C",
-    "height_difference_mm": "offset of the height difference, mm",
-    "weight_n_per_m": "weight of the wire, N/m",
-    "stiffness_n": "stiffness of the wire, N",
-    "expansion_ppm_per_c": "expansion, ppm/°C",
-    "scale_sum_mm": "offset of the end scales, mm",
+    "certified_mm": ("certified length of the wire", "mm"),
+    "tension_n": ("offset of the tension", "N"),
+    "temperature_c": ("offset of the thermometer", "°C"),
+    "height_difference_mm": ("offset of the height difference", "mm"),
+    "weight_n_per_m": ("weight of the wire", "N/m"),
+    "stiffness_n": ("stiffness of the wire", "N"),
+    "expansion_ppm_per_c": ("expansion", "ppm/°C"),
+    "scale_sum_mm": ("offset of the end scales", "mm"),
 }
 
 
@@ -125,8 +125,8 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
     values = {name: readings.get(name) for name in (*STEPS, "scale_sum_mm")}
     distance = _distance_mm(values, sheet.hanging)
     effects = [
-        Effect(label, _slope(values, name, sheet.hanging), getattr(sheet, f"u_{name}"))
-        for name, label in SHARED.items()
+        Effect(label, _slope(values, name, sheet.hanging), getattr(sheet, f"u_{name}"), unit)
+        for name, (label, unit) in SHARED.items()
         if not (name == "certified_mm" and sheet.known_distance_mm is not None)
     ]
     certified = sheet.known_distance_mm
@@ -134,8 +134,8 @@ def measure_with_wire(readings: SheetReadings, reject: bool = False) -> Calibrat
         observed, design = distance, np.ones((m, 1))
     else:  # observed = excess of the wire over its certified length, times its slope
         observed, design = certified - distance, _slope(values, "certified_mm", sheet.hanging)[:, None]
-        effects = [Effect(e.name, -e.column, e.u) for e in effects]
-        effects.append(Effect("known distance, mm", np.ones(m), sheet.u_known_distance_mm))
+        effects = [Effect(e.name, -e.column, e.u, e.unit) for e in effects]
+        effects.append(Effect("known distance", np.ones(m), sheet.u_known_distance_mm, "mm"))
     scatter = ObservedScatter(np.zeros((m, m)), {"scatter of one reading": np.eye(m)})
     if sheet.u_reading_mm is not None:
         scatter = ObservedScatter(sheet.u_reading_mm**2 * np.eye(m))

@@ -111,8 +111,8 @@ def calibrate_alignment(readings: SheetReadings, reject: bool = False) -> Calibr
         parameters += [
             ModelParameter(f"{axis} of screen {name}", float(v), 1e-2) for axis, v in zip("pq", middle, strict=True)
         ]
-        parameters.append(ModelParameter(f"turn of screen {name}", 0.0, 1e-4, sheet.u_screen_turn_deg * DEGREE))
-        parameters.append(ModelParameter(f"path of screen {name}", 0.0, 1e-2, sheet.u_path_mm))
+        parameters.append(ModelParameter(f"turn of screen {name}", 0.0, 1e-4, sheet.u_screen_turn_deg * DEGREE, "rad"))
+        parameters.append(ModelParameter(f"path of screen {name}", 0.0, 1e-2, sheet.u_path_mm, "mm"))
 
     def predict(values: np.ndarray) -> np.ndarray:
         zero_p, zero_q, turn, further = values[4:].reshape(-1, 4)[which].T

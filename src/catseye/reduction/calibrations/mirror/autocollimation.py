@@ -172,19 +172,19 @@ def _parameters(readings: SheetReadings, flat: bool) -> list[ModelParameter]:
     sheet = readings.sheet
 
     def arcseconds(name: str, u: float | None) -> ModelParameter:
-        return ModelParameter(name, 0.0, STEP, np.inf if u is None else u * ARCSECOND)
+        return ModelParameter(name, 0.0, STEP, np.inf if u is None else u * ARCSECOND, "rad")
 
     return [
         ModelParameter("beta1", 0.0, STEP),
         ModelParameter("beta2", 0.0, STEP),
-        ModelParameter("N_a0", sheet.na0_nominal, 0.1, np.inf if flat else sheet.u_na0_counts),
+        ModelParameter("N_a0", sheet.na0_nominal, 0.1, np.inf if flat else sheet.u_na0_counts, "counts"),
         ModelParameter("N_e0", sheet.ne0_nominal, 0.1),
         arcseconds("face tilt", sheet.u_face_tilt_arcsec),
         arcseconds("axis tilt", sheet.u_axis_tilt_arcsec),
         arcseconds("lean x", sheet.u_lean_x_arcsec),
         arcseconds("lean y", sheet.u_lean_y_arcsec),
         arcseconds("roll", sheet.u_roll_arcsec),
-        ModelParameter("scale", 0.0, 1e-3, sheet.u_scale_percent / 100.0),
+        ModelParameter("scale", 0.0, 1e-3, sheet.u_scale_percent / 100.0, "1"),
         arcseconds("flat up", sheet.u_flat_arcsec if flat else 0.0),
         arcseconds("flat along", sheet.u_flat_turn_arcsec if flat else 0.0),
     ]

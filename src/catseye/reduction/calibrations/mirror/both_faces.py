@@ -151,8 +151,10 @@ def _parameters(
         ModelParameter("axis offset", 0.0, 1e-2),
         ModelParameter("mirror offset", 0.0, 1e-2, np.inf if has_distances and (to[FACE] | to[TARGET]).any() else 0.0),
         ModelParameter("back retroreflector", 0.0, 1e-2, np.inf if has_distances and to[BACK].any() else 0.0),
-        ModelParameter("zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if has_distances and to[TARGET].any() else 0.0),
-        *(ModelParameter(f"line {key}", float(distance[which == k][0]), 1e-4, u) for k, key in enumerate(keys)),
+        ModelParameter(
+            "zero", 0.0, 1e-2, (sheet.u_zero_mm or 0.0) if has_distances and to[TARGET].any() else 0.0, "mm"
+        ),
+        *(ModelParameter(f"line {key}", float(distance[which == k][0]), 1e-4, u, "m") for k, key in enumerate(keys)),
     ]
 
 

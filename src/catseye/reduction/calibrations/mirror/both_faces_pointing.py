@@ -176,10 +176,12 @@ def _parameters(
         ModelParameter("face tilt", 0.0, STEP),
         ModelParameter("beam tilt x", 0.0, STEP, free),
         ModelParameter("beam tilt y", 0.0, STEP, free),
-        *(ModelParameter(key, getattr(sheet, key), 1e-2, sheet.u_axis_mm) for key in OFFSETS),
-        ModelParameter("axis tilt", 0.0, STEP, sheet.u_axis_tilt_arcsec * ARCSECOND),
+        *(ModelParameter(key, getattr(sheet, key), 1e-2, sheet.u_axis_mm, "mm") for key in OFFSETS),
+        ModelParameter("axis tilt", 0.0, STEP, sheet.u_axis_tilt_arcsec * ARCSECOND, "rad"),
         *(
-            ModelParameter(f"frame {axis}", 0.0, STEP, (sheet.u_frame_arcsec if has_directions else 0.0) * ARCSECOND)
+            ModelParameter(
+                f"frame {axis}", 0.0, STEP, (sheet.u_frame_arcsec if has_directions else 0.0) * ARCSECOND, "rad"
+            )
             for axis in "xy"
         ),
     ]
@@ -196,8 +198,8 @@ def _parameters(
     for k, name in enumerate(names):
         first = int(np.argmax(which == k))
         across = np.sin(phi[first])  # u is across the sight
-        mirror.append(ModelParameter(f"theta of {name}", float(theta[first]), STEP, u / across))
-        mirror.append(ModelParameter(f"phi of {name}", float(phi[first]), STEP, u))
+        mirror.append(ModelParameter(f"theta of {name}", float(theta[first]), STEP, u / across, "rad"))
+        mirror.append(ModelParameter(f"phi of {name}", float(phi[first]), STEP, u, "rad"))
     return mirror
 
 

@@ -143,8 +143,8 @@ def _parameters(sheet: FocusSheet, place: np.ndarray, observed: np.ndarray) -> l
         ModelParameter("top", float(observed.max()), 1e-3),
         ModelParameter("best focus", float(best), 1e-4),
         ModelParameter("depth", max(depth, 1e-3), 1e-4),
-        ModelParameter("installed", sheet.installed_mm, 1e-4, sheet.u_installed_mm),
-        ModelParameter("coupling", sheet.amplitude_to_phase_rad or 0.0, 1e-6, sheet.u_amplitude_to_phase_rad),
+        ModelParameter("installed", sheet.installed_mm, 1e-4, sheet.u_installed_mm, "mm"),
+        ModelParameter("coupling", sheet.amplitude_to_phase_rad or 0.0, 1e-6, sheet.u_amplitude_to_phase_rad, "rad"),
         ModelParameter("half wavelength", sheet.half_wavelength_mm, 1e-3, 0.0),
     ]
     if sheet.model == CURVE:
@@ -204,9 +204,8 @@ def _results(solution: CurvedFit, model: Model, coupled: bool) -> tuple[tuple[Qu
         )
     turn = np.column_stack(slopes)[: len(keys)]
     covariance = turn @ solution.covariance @ turn.T
-    sought = [k for k, p in enumerate(solution.parameters) if np.isinf(p.u)]
     values = _derived(solution.values, model)[: len(keys)]
-    return quantities(keys, values, covariance, fit=solution.fit, turn=turn[:, sought]), covariance
+    return quantities(keys, values, covariance, fit=solution.fit, turn=turn[:, solution.uncertain]), covariance
 
 
 def _calibration(readings: SheetReadings, solution: CurvedFit, model: Model, longer: CurvedFit | None) -> Calibration:

@@ -109,7 +109,7 @@ def calibrate_encoder(readings: SheetReadings, reject: bool = False) -> Calibrat
     parameters = _parameters(sheet, runs, which, off)
     if "face" in readings.words:
         u = sheet.u_face_arcsec * ARCSECOND
-        parameters += [ModelParameter(f"face {name}", 0.0, 1e-5, u) for name in faces]
+        parameters += [ModelParameter(f"face {name}", 0.0, 1e-5, u, "rad") for name in faces]
     waves, n = 2 * sheet.orders, len(runs)
 
     def predict(values: np.ndarray) -> np.ndarray:

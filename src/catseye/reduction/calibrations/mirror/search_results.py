@@ -47,7 +47,8 @@ KIND = "search-results"
 COUNTS, PLACE = Within(-1_000_000, 1_000_000), Within(-10_000, 10_000)
 UNCERTAIN = Within(0, 1000, above=True)
 P = len(PARAMETERS)
-STEPS = (*[1e-4] * 3, *[1e-6] * 3, *[1e-4] * 3, *[1e-6] * 2, *[0.1] * 2)  # m, rad, m, rad, counts
+STEPS = (*[1e-4] * 3, *[1e-6] * 3, *[1e-4] * 3, *[1e-6] * 2, *[0.1] * 2)
+UNITS = (*["m"] * 3, *["rad"] * 3, *["m"] * 3, *["rad"] * 2, *["counts"] * 2)  # of the parameters and their steps
 IN_FILES = {  # name -> key of the records, its unit, size of the unit, record
     **{k: (f"{k}_mm", "mm", MILLIMETRE, "monument") for k in ("x", "y", "z")},
     **{k: (f"{k}_rad", "rad", 1.0, "monument") for k in ("alpha1", "alpha2", "alpha3")},
@@ -129,9 +130,11 @@ def calibrate_search_results(readings: SheetReadings, reject: bool = False) -> C
     turns = np.zeros((m, 2))
     start = station_of(sheet.monument, sheet.mirror).parameters
     u = np.sqrt(np.diag(covariance))
-    parameters = [ModelParameter(*parameter) for parameter in zip(PARAMETERS, start, STEPS, u, strict=True)]
+    parameters = [ModelParameter(*parameter) for parameter in zip(PARAMETERS, start, STEPS, u, UNITS, strict=True)]
     parameters += [
-        ModelParameter(f"{name} {axis}", 0.0, 1e-4, sheet.u_target_mm * MILLIMETRE) for name in names for axis in "xyz"
+        ModelParameter(f"{name} {axis}", 0.0, 1e-4, sheet.u_target_mm * MILLIMETRE, "m")
+        for name in names
+        for axis in "xyz"
     ]
 
     def predict(values: np.ndarray) -> np.ndarray:

@@ -158,9 +158,9 @@ def _linear(sights: DirectionSights, at: np.ndarray, tied: bool) -> LinearisedDi
     turned, zenith = geometry_of(sights, at[0], base)
     effects = _instrument_effects(sights, turned, zenith)
     if tied:
-        effects.append(Effect("circle's zero of the plate, arcsec", np.full(m, ARCSECOND), sheet.u_plate_zero_arcsec))
-    for name, u, step, change in _changes(sights):
-        effects.append(Effect(name, slope(step, (at[0], change(step)), (at[0], change(-step))), u))
+        effects.append(Effect("circle's zero of the plate", np.full(m, ARCSECOND), sheet.u_plate_zero_arcsec, "arcsec"))
+    for name, unit, u, step, change in _changes(sights):
+        effects.append(Effect(name, slope(step, (at[0], change(step)), (at[0], change(-step))), u, unit))
     return LinearisedDirections(off + design @ at, design, effects)
 
 
@@ -172,22 +172,24 @@ def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.
     sheet = sights.readings.sheet
     per = ARCSECOND
     effects = [
-        Effect("collimation, arcsec", per * sights.face / np.sin(zenith), sheet.u_collimation_arcsec),
-        Effect("trunnion axis, arcsec", per * sights.face / np.tan(zenith), sheet.u_trunnion_arcsec),
+        Effect("collimation", per * sights.face / np.sin(zenith), sheet.u_collimation_arcsec, "arcsec"),
+        Effect("trunnion axis", per * sights.face / np.tan(zenith), sheet.u_trunnion_arcsec, "arcsec"),
         Effect(
-            "lean of the axis to x^, arcsec",
+            "lean of the axis to x^",
             leaning(sights, turned, zenith, lean_x=per, lean_z=0.0),
             sheet.u_lean_arcsec,
+            "arcsec",
         ),
         Effect(
-            "lean of the axis to z^, arcsec",
+            "lean of the axis to z^",
             leaning(sights, turned, zenith, lean_x=0.0, lean_z=per),
             sheet.u_lean_arcsec,
+            "arcsec",
         ),
     ]
     for k, reference in enumerate(sheet.reference):
         rows = sights.are("reference") & (sights.which == k)
-        effects.append(Effect(f"v-block from {reference.name}, arcsec", -per * rows, reference.u_v_block_arcsec))
+        effects.append(Effect(f"v-block from {reference.name}", -per * rows, reference.u_v_block_arcsec, "arcsec"))
     if sheet.u_transport_arcsec is None:
         return effects
     for k, name in enumerate(sights.sets):
@@ -196,16 +198,16 @@ def _instrument_effects(sights: DirectionSights, turned: np.ndarray, zenith: np.
             continue
         # A walk of the circle between the two visits to the lab: what the closure shares in proportion, and the bridge.
         u = sheet.u_transport_arcsec
-        effects.append(Effect(f"closure of set {name}, arcsec", per * rows * sights.share, u))
+        effects.append(Effect(f"closure of set {name}", per * rows * sights.share, u, "arcsec"))
         bridge = np.sqrt(sights.share * (1.0 - sights.share))
-        effects.append(Effect(f"transport of set {name} beyond its closure, arcsec", per * rows * bridge, u))
+        effects.append(Effect(f"transport of set {name} beyond its closure", per * rows * bridge, u, "arcsec"))
     return effects
 
 
-def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Callable[[float], SightConditions]]]:
+def _changes(sights: DirectionSights) -> list[tuple[str, str, float, float, Callable[[float], SightConditions]]]:
     """Changes of the geometry's inputs.
 
-    (name, u, step, change of a step -> conditions); u in the unit of the step.
+    (name, unit, u, step, change of a step -> conditions); u in the unit of the step.
     """
     sheet = sights.readings.sheet
     angle, length = STEPS["angle"], STEPS["length"]
@@ -216,25 +218,25 @@ def _changes(sights: DirectionSights) -> list[tuple[str, float, float, Callable[
     def points_along(shape: np.ndarray) -> Callable[[float], SightConditions]:
         return lambda s: SightConditions(points=s * shape)
 
-    changes: list[tuple[str, float, float, Callable[[float], SightConditions]]] = [
-        ("xi, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(xi=s)),
-        ("eta, rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(eta=s)),
+    changes: list[tuple[str, str, float, float, Callable[[float], SightConditions]]] = [
+        ("xi", "rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(xi=s)),
+        ("eta", "rad", sheet.u_deflection_arcsec * ARCSECOND, angle, lambda s: SightConditions(eta=s)),
     ]
     if sights.are("star").any():
         late = float(np.hypot(sheet.u_ut1_utc_s, sheet.u_clock_s))
         u_pole = sheet.u_pole_arcsec * ARCSECOND
         changes += [
-            ("time and UT1, s", late, STEPS["time"], lambda s: SightConditions(time=s)),
-            ("pole x, rad", u_pole, angle, lambda s: SightConditions(pole=(s, 0.0))),
-            ("pole y, rad", u_pole, angle, lambda s: SightConditions(pole=(0.0, s))),
+            ("time and UT1", "s", late, STEPS["time"], lambda s: SightConditions(time=s)),
+            ("pole x", "rad", u_pole, angle, lambda s: SightConditions(pole=(s, 0.0))),
+            ("pole y", "rad", u_pole, angle, lambda s: SightConditions(pole=(0.0, s))),
         ]
     u_offset = sheet.u_instrument_mm * MILLIMETRE
     for k, axis in enumerate(("x", "y", "z")):
-        changes.append((f"instrument d{axis}, m", u_offset, length, offset_along(np.eye(3)[k])))
+        changes.append((f"instrument d{axis}", "m", u_offset, length, offset_along(np.eye(3)[k])))
     for number, column in enumerate(_coordinate_columns(sheet)):
         size = float(np.abs(column).max())
         shape = column.reshape(-1, 3) / size
-        changes.append((f"coordinates, component {number + 1}", size, length, points_along(shape)))
+        changes.append((f"coordinates, component {number + 1}", "m", size, length, points_along(shape)))
     return changes
 
 
@@ -405,7 +407,7 @@ def _largest(fit: CalibrationFit, linear: LinearisedDirections) -> str:
     gain = np.linalg.solve(design.T @ weight @ design, design.T @ weight)[0]
     parts = np.abs(gain @ columns[:, 1:]) / ARCSECOND
     most = np.argsort(-parts)[:3]
-    return "; ".join(f'{acting[k].name.split(",")[0]} {parts[k]:.2g}"' for k in most) or "none"
+    return "; ".join(f'{acting[k].name} {parts[k]:.2g}"' for k in most) or "none"
 
 
 def _dms(angle: float) -> str:

@@ -133,15 +133,15 @@ def calibrate_level(readings: SheetReadings, reject: bool = False) -> Calibratio
     # observed = climb of the others - side C
     design, names = climb[:, 1:], [f"height of {mark}" for mark in marks[1:]]
     effects = [
-        Effect("thermometers, °C", side * by_temperature, sheet.u_temperature_c),
-        Effect("micrometers, ppm", PPM * difference, sheet.u_scale_ppm),
-        Effect("height of the held mark, mm", climb[:, 0] * MILLIMETRE, sheet.u_held_height_mm),
+        Effect("thermometers", side * by_temperature, sheet.u_temperature_c, "°C"),
+        Effect("micrometers", PPM * difference, sheet.u_scale_ppm, "ppm"),
+        Effect("height of the held mark", climb[:, 0] * MILLIMETRE, sheet.u_held_height_mm, "mm"),
     ]
     if sheet.constant_mm is not None:
         if sheet.u_constant_mm is None:
             raise refusal(readings.sheet_file, "u_constant_mm is missing (expected a value beside constant_mm)")
         observed = observed + side * sheet.constant_mm * MILLIMETRE
-        effects.append(Effect("constant of the instrument, mm", -side * MILLIMETRE, sheet.u_constant_mm))
+        effects.append(Effect("constant of the instrument", -side * MILLIMETRE, sheet.u_constant_mm, "mm"))
     else:
         design, names = np.column_stack([design, -side]), [*names, "constant (exchange the vessels)"]
     claimed = np.diag((sheet.u_tube_c * by_temperature) ** 2)

@@ -291,13 +291,13 @@ class _AxisReadings:
         effects = []
         if self.sheet.u_tilt_percent and not self.pier:
             by_scale = (self.predicted(constants, 1e-3) - self.predicted(constants, -1e-3)) / 2e-3
-            effects.append(Effect("scale of the table, %", 0.01 * by_scale, self.sheet.u_tilt_percent))
+            effects.append(Effect("scale of the table", 0.01 * by_scale, self.sheet.u_tilt_percent, "%"))
         if self.pier:
             for k, axis in enumerate("xy"):
                 share = 0.01 * constants[2 + k] * slope(2 + k)
-                effects.append(Effect(f"scale of {axis}, %", share, self.sheet.u_scale_percent))
+                effects.append(Effect(f"scale of {axis}", share, self.sheet.u_scale_percent, "%"))
             by_turn = slope(4) + slope(5)
-            effects.append(Effect("turn of the case, arcsec", ARCSECOND * by_turn, self.sheet.u_case_arcsec))
+            effects.append(Effect("turn of the case", ARCSECOND * by_turn, self.sheet.u_case_arcsec, "arcsec"))
         return design, effects, self.predicted(constants)
 
     def scatter(self, at: np.ndarray) -> ObservedScatter:

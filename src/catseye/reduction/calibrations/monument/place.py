@@ -19,6 +19,7 @@ from catseye.geometry.frames.local_frame import LocalFrame, elevation_factor, gr
 from catseye.records.files.readings import TEXT, SheetLayout, SheetReadings
 from catseye.records.files.record import Elevation, Within
 from catseye.records.files.refusal import refusal, shown
+from catseye.reduction.calibrations.budget import SharedInput
 from catseye.reduction.calibrations.calibration import Calibration, RecordValue
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, provenance, quantities
@@ -94,10 +95,14 @@ def measure_place(readings: SheetReadings, reject: bool = False) -> Calibration:
     frame = frame_of(sheet)
     try:
         values, covariance = monument_place(frame, coordinates, _covariance(readings, row), system=sheet.system)
-        covariance = covariance + _by_deflection(sheet, coordinates)
+        survey = SharedInput(
+            "coordinates of the survey adjustment", np.sqrt(np.diag(covariance)), "", np.ones(len(KEYS))
+        )
+        deflection = _by_deflection(sheet, coordinates)
     except ValueError as problem:
         raise refusal(readings.file, f"{readings.where[row]}, {problem}") from problem
-    return _calibration(readings, row, frame, values, covariance)
+    covariance = covariance + sum(each.covariance for each in deflection)
+    return _calibration(readings, row, frame, values, covariance, [survey, *deflection])
 
 
 def monument_place(
@@ -146,12 +151,12 @@ def _covariance(readings: SheetReadings, row: int) -> np.ndarray:
     return matrix * MILLIMETRE**2
 
 
-def _by_deflection(sheet: PlaceSheet, coordinates: np.ndarray) -> np.ndarray:
-    """Covariance added by the deflection's u.
+def _by_deflection(sheet: PlaceSheet, coordinates: np.ndarray) -> list[SharedInput]:
+    """Deflection of the plumb line as inputs.
 
     Heights above the geoid tilt with it, 1 mm at 2" and 100 m.
     """
-    total = np.zeros((len(KEYS), len(KEYS)))
+    inputs = []
     for name in ("xi", "eta"):
         ends = [
             monument_place(frame_of(sheet, **{name: sign * TILT}), coordinates, np.zeros((3, 3)), system=sheet.system)[
@@ -160,15 +165,21 @@ def _by_deflection(sheet: PlaceSheet, coordinates: np.ndarray) -> np.ndarray:
             for sign in (1.0, -1.0)
         ]
         slope = (ends[0] - ends[1]) / (2.0 * TILT)
-        total += (sheet.u_deflection_arcsec * ARCSECOND) ** 2 * np.outer(slope, slope)
-    return total
+        source = f"deflection of the plumb line, {name}"
+        inputs.append(SharedInput(source, sheet.u_deflection_arcsec * ARCSECOND, "rad", slope))
+    return inputs
 
 
 def _calibration(
-    readings: SheetReadings, row: int, frame: LocalFrame, values: np.ndarray, covariance: np.ndarray
+    readings: SheetReadings,
+    row: int,
+    frame: LocalFrame,
+    values: np.ndarray,
+    covariance: np.ndarray,
+    inputs: list[SharedInput],
 ) -> Calibration:
     sheet = readings.sheet
-    calibrated = quantities(KEYS, values, covariance)
+    calibrated = quantities(KEYS, values, covariance, inputs=inputs)
     latitude, longitude = values[3] * DEGREE, values[4] * DEGREE
     scale, convergence = grid(latitude, longitude)
     height = frame.geodetic(values[:3] * MILLIMETRE)[2]

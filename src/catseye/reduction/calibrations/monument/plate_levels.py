@@ -22,6 +22,7 @@ from catseye.geometry.frames.plumb import lean, mount_angles, plumb_from_ground
 from catseye.geometry.mirror.mount import gamma
 from catseye.records.files.readings import SheetLayout, SheetReadings
 from catseye.records.files.record import Within
+from catseye.reduction.calibrations.budget import SharedInput
 from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.fit import (
     CalibrationFit,
@@ -105,7 +106,7 @@ def calibrate_plate(readings: SheetReadings, reject: bool = False) -> Calibratio
 
     first = fitted(effects, readings.active, reject)
     tilted = design[:, :2] @ first.x[:2]  # the scale acts on the tilts, which the first fit knows well enough
-    scale = Effect("scale of the level, %", 0.01 * tilted, sheet.u_scale_percent)
+    scale = Effect("scale of the level", 0.01 * tilted, sheet.u_scale_percent, "%")
     return _calibration(readings, fitted([*effects, scale], first.active, False))
 
 
@@ -118,7 +119,7 @@ def _effects(readings: SheetReadings, turned: np.ndarray) -> list[Effect]:
     plate = readings.get("plate_deg") * DEGREE if "plate_deg" in readings.numbers else np.zeros(len(readings))
     named = {"wedge of the plate": (turned - plate, sheet.u_wedge_arcsec), "balls": (turned, sheet.u_balls_arcsec)}
     return [
-        Effect(f"{name}, {axis}, arcsec", ARCSECOND * wave(angle), u)
+        Effect(f"{name}, {axis}", ARCSECOND * wave(angle), u, "arcsec")
         for name, (angle, u) in named.items()
         for axis, wave in (("along its mark" if "wedge" in name else "x^", np.cos),
                            ("square to it" if "wedge" in name else "z^", np.sin))
@@ -139,8 +140,8 @@ def _in_ground(sheet: PlateSheet, tilts: np.ndarray, *, xi: float = 0.0, eta: fl
     return mount_angles(local @ plumb)[1:]
 
 
-def _derived(sheet: PlateSheet, fit: CalibrationFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values (3,), covariance, and derivatives by the fit.
+def _derived(sheet: PlateSheet, fit: CalibrationFit) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[SharedInput]]:
+    """Values (3,), covariance, derivatives by the fit, and the deflection as inputs.
 
     alpha2, alpha3 (rad) and the level's zero (arcsec).
     """
@@ -152,8 +153,12 @@ def _derived(sheet: PlateSheet, fit: CalibrationFit) -> tuple[np.ndarray, np.nda
         moved = [_in_ground(sheet, tilts, **{name: sign * STEP}) for sign in (1.0, -1.0)]
         by_deflection[:2, column] = (moved[0] - moved[1]) / (2.0 * STEP)
     u_deflection = sheet.u_deflection_arcsec * ARCSECOND
-    covariance = turn @ fit.covariance @ turn.T + u_deflection**2 * by_deflection @ by_deflection.T
-    return np.array([*_in_ground(sheet, tilts), fit.x[2] / ARCSECOND]), covariance, turn
+    inputs = [
+        SharedInput(f"deflection of the plumb line, {name}", u_deflection, "rad", slopes)
+        for name, slopes in zip(("xi", "eta"), by_deflection.T, strict=True)
+    ]
+    covariance = turn @ fit.covariance @ turn.T + sum(each.covariance for each in inputs)
+    return np.array([*_in_ground(sheet, tilts), fit.x[2] / ARCSECOND]), covariance, turn, inputs
 
 
 def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...], ...]:
@@ -174,13 +179,13 @@ def _rows(readings: SheetReadings, fit: CalibrationFit) -> tuple[tuple[Cell, ...
 
 def _calibration(readings: SheetReadings, fit: CalibrationFit) -> Calibration:
     sheet = readings.sheet
-    values, covariance, turn = _derived(sheet, fit)
+    values, covariance, turn, inputs = _derived(sheet, fit)
     keys = [
         ("alpha2_rad", "rad", "turn of the mount about z^, against the ground frame's z"),
         ("alpha3_rad", "rad", "turn of the mount about x^, against the ground frame's z"),
         ("level_zero_arcsec", "arcsec", "what the level reads on a level plate"),
     ]
-    calibrated = quantities(keys, values, covariance, fit=fit, turn=turn)
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=turn, inputs=inputs)
     leans = lean(frame_of(sheet), np.array([sheet.x_mm, sheet.y_mm, sheet.z_mm]) * MILLIMETRE) / ARCSECOND
     local = np.array([fit.x[0], -fit.x[1]]) / ARCSECOND
     around = np.linspace(0.0, 360.0, 361)

@@ -20,7 +20,11 @@ WEATHER = {
     "pressure_hpa": Within(300, 1200),
     "humidity_percent": Within(0, 100),
 }
-SENSORS = ("temperature_c", "pressure_hpa", "humidity_percent")
+SENSORS = {  # key of the sheet -> name and unit
+    "temperature_c": ("temperature", "°C"),
+    "pressure_hpa": ("pressure", "hPa"),
+    "humidity_percent": ("humidity", "%"),
+}
 Spread = Annotated[float, Within(0, 100)]
 
 
@@ -99,14 +103,14 @@ def sensor_effects(readings: SheetReadings, columns: np.ndarray) -> list[Effect]
     """
     sheet = readings.sheet
     return [
-        Effect(f"offset of the sensor of {name}", column, getattr(sheet, f"u_{name}"))
-        for name, column in zip(SENSORS, columns, strict=True)
+        Effect(f"offset of the sensor of {name}", column, getattr(sheet, f"u_{key}"), unit)
+        for (key, (name, unit)), column in zip(SENSORS.items(), columns, strict=True)
     ]
 
 
 def formula_effect(state: CalibrationAir, path: np.ndarray) -> Effect:
     """Effect of the formula for the group index on the path (m,) m."""
-    return Effect("formula for the group index", path / state.index, state.u_model)
+    return Effect("formula for the group index", path / state.index, state.u_model, "1")
 
 
 def ranger_effects(readings: SheetReadings, state: CalibrationAir, path: np.ndarray) -> list[Effect]:
@@ -119,7 +123,7 @@ def ranger_effects(readings: SheetReadings, state: CalibrationAir, path: np.ndar
     """
     stretch = path / state.index
     return [
-        Effect("frequency of the modulation, ppm", path * PPM, readings.sheet.u_modulation_ppm),
+        Effect("frequency of the modulation", path * PPM, readings.sheet.u_modulation_ppm, "ppm"),
         formula_effect(state, path),
         *sensor_effects(readings, state.slopes * stretch),
     ]

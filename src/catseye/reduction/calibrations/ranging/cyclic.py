@@ -19,5 +19,5 @@ def cyclic_effects(phase_fraction: np.ndarray, u_cyclic_mm: float, orders: int =
     orders           1 to this
     """
     columns = cyclic_design(phase_fraction, orders) * MILLIMETRE
-    names = [f"cyclic {part} of order {k}, mm" for part in ("cosine", "sine") for k in range(1, orders + 1)]
-    return [Effect(name, column, u_cyclic_mm) for name, column in zip(names, columns.T, strict=True)]
+    names = [f"cyclic {part} of order {k}" for part in ("cosine", "sine") for k in range(1, orders + 1)]
+    return [Effect(name, column, u_cyclic_mm, "mm") for name, column in zip(names, columns.T, strict=True)]

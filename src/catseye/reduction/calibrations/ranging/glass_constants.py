@@ -17,6 +17,7 @@ from catseye.geometry.catenary import expanded
 from catseye.optics.retroreflector import cats_eye, prism
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Uncertainty, Within
+from catseye.reduction.calibrations.budget import SharedInput
 from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import (
@@ -160,9 +161,9 @@ def _dimensions(
         scatter,
         names=names,
         effects=[
-            Effect("offset of the gauge, mm", np.ones(m), sheet.u_gauge_mm),
-            Effect("offset of the thermometer, °C", observed * expansion, sheet.u_temperature_c),
-            Effect("expansion, ppm/°C", observed * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c),
+            Effect("offset of the gauge", np.ones(m), sheet.u_gauge_mm, "mm"),
+            Effect("offset of the thermometer", observed * expansion, sheet.u_temperature_c, "°C"),
+            Effect("expansion", observed * (temperature - 20.0) * PPM, sheet.u_expansion_ppm_per_c, "ppm/°C"),
         ],
         options=FitOptions(active=readings.active, reject=reject, level=sheet.level),
     )
@@ -197,7 +198,8 @@ def _calibration(
     decisions: tuple[CheckOutcome, ...] = (),
 ) -> Calibration:
     sheet, by_size, by_index = readings.sheet, constants.by_size, constants.by_index
-    covariance = by_size @ fit.covariance @ by_size.T + sheet.u_index_ratio**2 * np.outer(by_index, by_index)
+    index = SharedInput("index ratio of glass and air", sheet.u_index_ratio, "1", by_index)
+    covariance = by_size @ fit.covariance @ by_size.T + index.covariance
     covariance = 0.5 * (covariance + covariance.T)
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (*(words[k] for words in readings.words.values()), float(fit.predicted[k] + fit.residual[k]),
@@ -208,7 +210,7 @@ def _calibration(
         kind=kind,
         title=f"{what} constants of {sheet.instrument}",
         provenance=provenance(readings),
-        quantities=quantities(constants.keys, constants.values, covariance, fit=fit, turn=by_size),
+        quantities=quantities(constants.keys, constants.values, covariance, fit=fit, turn=by_size, inputs=[index]),
         covariance=covariance,
         columns=(*readings.words, "size_at_20_c_mm", "residual_um", fit.test, "state"),
         rows=rows,

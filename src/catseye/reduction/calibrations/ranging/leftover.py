@@ -7,7 +7,7 @@ from catseye.records.files.refusal import refusal
 from catseye.reduction.calibrations.fit import Effect
 from catseye.signal.systematics.leakage import phase_by_leakage
 
-NAMES = ("leakage left over, real part, V", "leakage left over, imaginary part, V")
+NAMES = ("leakage left over, real part", "leakage left over, imaginary part")
 
 
 def leakage_effects(readings: SheetReadings, u_leakage_volt: float) -> list[Effect]:
@@ -33,4 +33,4 @@ def leakage_effects(readings: SheetReadings, u_leakage_volt: float) -> list[Effe
             )
         phasors.append(readings.get(amplitude) * np.exp(1j * readings.get(phase)))
     slopes = -phase_by_leakage(*phasors)
-    return [Effect(name, column, u_leakage_volt) for name, column in zip(NAMES, slopes.T, strict=True)]
+    return [Effect(name, column, u_leakage_volt, "V") for name, column in zip(NAMES, slopes.T, strict=True)]

@@ -52,8 +52,8 @@ def calibrate_linearity(readings: SheetReadings, reject: bool = False) -> Calibr
     effects = list(rail.effects)
     if len(orders) < min(requested, 2):  # terms that cannot be estimated stay a systematic effect of their prior size
         missing = [k for k in (1, 2) if k not in orders and k <= requested]
-        prior = cyclic_effects(rail.phase, sheet.u_cyclic_mm)
-        effects += [e for e in prior if any(f"order {k}," in e.name for k in missing)]
+        prior = cyclic_effects(rail.phase, sheet.u_cyclic_mm)  # cosines, then sines
+        effects += [e for k, e in zip((1, 2, 1, 2), prior, strict=True) if k in missing]
     active = readings.active
     if reject:
         active = _fit(rail, orders, effects, active, sheet.level, reject=True).active

@@ -12,9 +12,10 @@ import numpy as np
 from catseye.constants import TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
+from catseye.reduction.calibrations.budget import SharedInput
 from catseye.reduction.calibrations.calibration import Calibration, Quantity
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
-from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance
+from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance, quantities
 from catseye.signal.drift.allan import allan_deviation, expected_variance
 from catseye.signal.drift.noise import FEWEST, NoiseSpectrum, noise_spectrum
 
@@ -122,6 +123,10 @@ def _quantities(spectrum: NoiseSpectrum, sheet: OscillatorSheet) -> tuple[tuple[
     slope[:3] = MRAD2 * np.eye(3)
     slope[3, 0] = 0.5 * per_range / spectrum.white if spectrum.white > 0.0 else 0.0
     covariance = slope @ spectrum.covariance @ slope.T
+    u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    ordinates = SharedInput(
+        "ordinates of the spectrum", u, "", np.ones(len(u)), evaluation="A", distribution="likelihood, to first order"
+    )
     values = (*(MRAD2 * spectrum.squares), spectrum.white * per_range)
     keys = (
         ("white_mrad2", "mrad²", "variance of a reading, white"),
@@ -129,11 +134,7 @@ def _quantities(spectrum: NoiseSpectrum, sheet: OscillatorSheet) -> tuple[tuple[
         ("walk_mrad2", "mrad²", "variance of a step of the walk, reading to reading"),
         ("white_range_um", "µm", f"white noise of a range of {sheet.cycles_per_range} readings"),
     )
-    calibrated = tuple(
-        Quantity(key, float(v), float(np.sqrt(max(c, 0.0))), unit, meaning)
-        for (key, unit, meaning), v, c in zip(keys, values, np.diag(covariance), strict=True)
-    )
-    return calibrated, covariance
+    return quantities(keys, np.array(values), np.diag(u**2), inputs=[ordinates]), covariance
 
 
 def _lines(spectrum: NoiseSpectrum) -> str:

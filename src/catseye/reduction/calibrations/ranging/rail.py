@@ -108,11 +108,11 @@ def rail_of(readings: SheetReadings) -> Rail:
         stretch = stretch - sensed  # one thermometer serves both: most of its offset cancels
         effects.append(formula)
     effects += sensor_effects(readings, stretch)
-    effects.append(Effect("interferometer: scale, ppm", length * PPM, sheet.u_interferometer_ppm))
+    effects.append(Effect("interferometer: scale", length * PPM, sheet.u_interferometer_ppm, "ppm"))
     if sheet.start_m is not None:
         if sheet.u_start_mm is None:
             raise refusal(readings.sheet_file, "u_start_mm is missing (expected a value beside start_m)")
-        effects.append(Effect("start of the interferometer, mm", np.full(len(range_), MILLIMETRE), sheet.u_start_mm))
+        effects.append(Effect("start of the interferometer", np.full(len(range_), MILLIMETRE), sheet.u_start_mm, "mm"))
         length = length + sheet.start_m
     return Rail(
         length=length,
@@ -148,7 +148,7 @@ def _in_air(readings: SheetReadings) -> tuple[np.ndarray, np.ndarray, Effect]:
     by_index = vacuum / air.index**2 + dead * (air.index[first] / air.index**2)
     by_start = dead / air.index
     sensed = air.slopes * by_index - air.slopes[:, [first]] * by_start
-    return length, sensed, Effect("formula for the phase index", -(by_index - by_start), air.u_model)
+    return length, sensed, Effect("formula for the phase index", -(by_index - by_start), air.u_model, "1")
 
 
 def _scatter(readings: SheetReadings) -> ObservedScatter:

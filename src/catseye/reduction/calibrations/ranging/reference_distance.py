@@ -152,15 +152,17 @@ def _effects(
     sheet = readings.sheet
     ones = np.ones(len(length))
     effects = [
-        Effect("known distances: common offset, mm", ones * MILLIMETRE, sheet.u_distance_common_mm),
-        Effect("known distances: scale, ppm", readings.get("distance_m") * PPM, sheet.u_distance_ppm),
-        Effect("constant of the target, mm", -ones * MILLIMETRE, sheet.u_pc_mm),
-        *(Effect(e.name, -e.column, e.u) for e in ranger),
-        *(Effect(e.name, -e.column, e.u) for e in cyclic_effects(phase, sheet.u_cyclic_mm)),
+        Effect("known distances: common offset", ones * MILLIMETRE, sheet.u_distance_common_mm, "mm"),
+        Effect("known distances: scale", readings.get("distance_m") * PPM, sheet.u_distance_ppm, "ppm"),
+        Effect("constant of the target", -ones * MILLIMETRE, sheet.u_pc_mm, "mm"),
+        *(Effect(e.name, -e.column, e.u, e.unit) for e in ranger),
+        *(Effect(e.name, -e.column, e.u, e.unit) for e in cyclic_effects(phase, sheet.u_cyclic_mm)),
     ]
     if sheet.u_leakage_volt > 0.0:
         per_radian = half / TWO_PI  # y falls with L, which falls with the phase
-        effects += [Effect(e.name, per_radian * e.column, e.u) for e in leakage_effects(readings, sheet.u_leakage_volt)]
+        effects += [
+            Effect(e.name, per_radian * e.column, e.u, e.unit) for e in leakage_effects(readings, sheet.u_leakage_volt)
+        ]
     return effects
 
 

@@ -9,6 +9,7 @@ from catseye.estimation.quality.repeatability import Repeatability
 from catseye.estimation.quality.repeatability import repeatability as analysed
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
+from catseye.reduction.calibrations.budget import SharedInput
 from catseye.reduction.calibrations.calibration import Calibration
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance, quantities
@@ -62,13 +63,14 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
         ("between_um", "µm", "standard deviation from set to set beyond that"),
         ("intermediate_um", "µm", "standard deviation of a range at another time"),
     ]
-    values, covariance = _deviations(analysis)
+    values, inputs = _deviations(analysis)
+    covariance = np.sum([each.covariance for each in inputs], axis=0)
     number = np.arange(1, len(readings) + 1)
     return Calibration(
         kind=KIND,
         title=f"Repeatability of {readings.sheet.instrument}",
         provenance=provenance(readings),
-        quantities=quantities(keys, values, covariance),
+        quantities=quantities(keys, values, covariance, inputs=inputs),
         covariance=covariance,
         columns=("set", "range_m", "within_um", "set_um", "state"),
         rows=rows,
@@ -99,8 +101,8 @@ def measure_repeatability(readings: SheetReadings, reject: bool = False) -> Cali
     )
 
 
-def _deviations(analysis: Repeatability) -> tuple[np.ndarray, np.ndarray]:
-    """Within, between and intermediate standard deviation, with covariance.
+def _deviations(analysis: Repeatability) -> tuple[np.ndarray, list[SharedInput]]:
+    """Within, between and intermediate standard deviation, with the inputs of their u.
 
     To first order.
 
@@ -109,15 +111,19 @@ def _deviations(analysis: Repeatability) -> tuple[np.ndarray, np.ndarray]:
     within, between = analysis.within**2, analysis.between**2
     size = analysis.usual  # readings a set that count
     squares = np.array([within, analysis.f * within])
-    variance = np.diag(2.0 * squares**2 / [analysis.degrees_within, analysis.degrees_between])
+    u_squares = squares * np.sqrt(2.0 / np.array([analysis.degrees_within, analysis.degrees_between]))
     by_square = np.array([[1.0, 0.0], [-1.0 / size, 1.0 / size], [1.0 - 1.0 / size, 1.0 / size]])
     values = np.array([analysis.within, analysis.between, analysis.intermediate])
-    covariance = by_square @ variance @ by_square.T
+    moved = by_square * u_squares
     size_of = values.copy()
     if between == 0.0:  # its square is uncertain all the same, its root as the root of that
-        size_of[1] = 0.5 * covariance[1, 1] ** 0.25
-    slope = 0.5 / size_of
-    return values, covariance * np.outer(slope, slope)
+        size_of[1] = 0.5 * float(moved[1] @ moved[1]) ** 0.25
+    slopes = by_square * (0.5 / size_of)[:, None]
+    names = ("mean square within sets", "mean square between sets")
+    return values, [
+        SharedInput(name, float(u), "µm²", slope, evaluation="A", distribution="chi-square, to first order")
+        for name, u, slope in zip(names, u_squares, slopes.T, strict=True)
+    ]
 
 
 RECIPE = CalibrationKind(

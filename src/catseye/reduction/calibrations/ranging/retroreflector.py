@@ -13,6 +13,7 @@ from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.files.readings import TEXT, TIME, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Uncertainty, Within
 from catseye.records.files.refusal import refusal, shown
+from catseye.reduction.calibrations.budget import SharedInput
 from catseye.reduction.calibrations.calibration import Calibration, Cell
 from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.fit import CalibrationFit, FitOptions, ObservedScatter, fit_readings
@@ -198,12 +199,14 @@ def _calibration(readings: SheetReadings, fit: CalibrationFit, unknown: list[str
     sheet, micrometre, count = readings.sheet, 1e-3 * MILLIMETRE, len(unknown)
     difference = fit.x[:count] / MILLIMETRE
     values = sheet.pc_mm - difference
-    covariance = fit.covariance[:count, :count] / MILLIMETRE**2 + sheet.u_pc_mm**2
+    reference = SharedInput(f"constant of the reference {sheet.reference}", sheet.u_pc_mm, "mm", np.ones(count))
+    covariance = fit.covariance[:count, :count] / MILLIMETRE**2 + reference.covariance
     keys = [
         ("pc_mm" if count == 1 else f"pc_{name}_mm", "mm", f"range constant of {name}, added to the measured length")
         for name in unknown
     ]
-    calibrated = quantities(keys, values, covariance, fit=fit, turn=np.eye(len(fit.x))[:count] / MILLIMETRE)
+    turn = np.eye(len(fit.x))[:count] / MILLIMETRE
+    calibrated = quantities(keys, values, covariance, fit=fit, turn=turn, inputs=[reference])
     hours, on = readings.hours(), fit.active
     # What is drawn: each reading less the level of its position and the offset of its retroreflector; the drift stays.
     parameters = fit.x.copy()

@@ -1,0 +1,1 @@
+"""Certificates of calibration: one document, written as a page or as PDF."""
