@@ -202,8 +202,9 @@ class Coordinator:
 
         Then switch off lasers that were switched on here, and close the journal, within 5 s.
         """
+        name = self.site.site.campaign.name
         self._event_log.tell(
-            "started", f"coordinator of {self.site.site.campaign.name}, {len(self.links)} rangers, {self.mode}"
+            "started", f"coordinator of {name}, {len(self.links)} rangers, {self.mode}", mode=self.mode
         )
         for name, link in self.links.items():
             self._spawn(link.run(), f"link {name}")
@@ -386,12 +387,13 @@ class Coordinator:
         self.mode = mode
         for name, link in self.links.items():
             link.wanted = "hold" if name in self.firing.dropped and mode == "active" else LINK_STATES[mode]
-        self._event_log.tell("mode", f"mode is {mode}", always=True)
+        self._event_log.tell("mode", f"mode is {mode}", always=True, mode=mode)
 
     def leased(self, before: str, holder: str) -> None:
         """Log a new holder of the coordinator's lease."""
         self.condition.holder = holder
-        self._event_log.tell("lease", f"the coordinator's lease passes from {before} to {holder}", always=True)
+        text = f"the coordinator's lease passes from {before} to {holder}"
+        self._event_log.tell("lease", text, always=True, holder=holder)
 
     def drop(self, ranger: str) -> None:
         """Exclude a ranger; it stays connected.

@@ -4,7 +4,7 @@ M&C's archivist reads them.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,8 +132,8 @@ def points_of(entry: EpochSolution) -> Iterable[EpochPoint]:
     values = np.full((count, 9), np.nan)
     values[:, :3] = places[:count]
     values[:, 3:] = triangles_of(entry.covariance, count)
-    used = tuple(entry.answer.get("shots") or ())[:count]
-    used = (*used, *([None] * (count - len(used))))
+    counts: Sequence[int | None] = entry.answer.get("shots") or ()
+    used = (*counts[:count], *([None] * (count - len(counts))))
     points = EpochPoints(_stamp(entry.ticks), _number(entry.answer.get("number")), names[:count], values, used)
     yield from (EpochPoint(points, k) for k in range(count))
 
