@@ -13,9 +13,10 @@ from catseye.coordinator.journal.entries import EPOCH_RANGES
 from catseye.errors import InputError
 from catseye.reduction.epoch.reason import status_of
 from catseye.service.watch.entries import COVARIANCE, Object, epoch_summary, number, numbers, words
-from catseye.service.watch.history import History, answer_of
+from catseye.service.watch.history import History
 from catseye.service.watch.index import first_seq
 from catseye.service.watch.site_map import SiteMap
+from catseye.service.watch.solutions import answer_of
 
 MOST_STRAY = 300  # rejected shots outside the epoch's own span of numbers that are looked up singly
 RANGES_BEHIND = text("SELECT seq, name, text FROM documents WHERE run = :run AND seq > :seq ORDER BY seq LIMIT 4")
@@ -37,7 +38,8 @@ class EpochRecord:
 
     def __init__(self, history: History, count: int, *, run: int | None = None, at: float | None = None):
         self._history = history
-        self.run, self.seq, self.solution = history.solution(count, run=run, at=at)
+        key, self.solution = history.solutions.solution(count, run=run, at=at)
+        self.run, self.seq = key.run, key.seq
         self.number = count
 
     @property
