@@ -78,7 +78,7 @@ class History:
         return self.index.site()
 
     def runs(self) -> list[Object]:
-        """Runs with their times."""
+        """Runs with their starts and ends."""
         return [
             {"run": run.run, "uuid": run.uuid, "started": mjd_of(run.started), "ended": mjd_of(run.ended)}
             for run in self.index.runs()

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import text
 
 from catseye.coordinator.journal.entries import EpochSolution
@@ -24,7 +25,8 @@ MOST_SUMMARIES = 20_000  # epochs remembered, 1 kB each
 TOGETHER = 250  # answers of one pass: a parameter each
 MOST_PROBES = 40  # of the search for an epoch's number
 KEYS = text("SELECT seq, ticks FROM solutions WHERE run = :run AND seq > :seq ORDER BY seq")
-SOLUTION = text("SELECT ticks, answer, size, covariance FROM solutions WHERE run = :run AND seq = :seq")
+ANSWER = text("SELECT ticks, answer FROM solutions WHERE run = :run AND seq = :seq")
+MATRIX = text("SELECT size, covariance FROM solutions WHERE run = :run AND seq = :seq")
 
 
 class Key(NamedTuple):
@@ -119,7 +121,7 @@ class Solutions:
                 yield _triangle(*found.get(key.seq, (0, None)))
 
     def solution(self, number: int, *, run: int | None = None, at: float | None = None) -> tuple[Key, EpochSolution]:
-        """Solution of an epoch and its place.
+        """Solution of an epoch without its covariance, and its place.
 
         Raises InputError for an unknown epoch.
         """
@@ -128,11 +130,16 @@ class Solutions:
         if key is None:
             raise InputError(f"epoch {number} is not in run {which} of the journal (expected one of its epochs)")
         with key.part.reading() as connection:
-            row = connection.execute(SOLUTION, {"run": key.run, "seq": key.seq}).one()
-        matrix = None
-        if row.covariance is not None and len(row.covariance) == 8 * row.size**2:
-            matrix = np.frombuffer(row.covariance, dtype="<f8").reshape(row.size, row.size)
-        return key, EpochSolution(row.ticks, answer_of(row.answer), matrix)
+            row = connection.execute(ANSWER, {"run": key.run, "seq": key.seq}).one()
+        return key, EpochSolution(row.ticks, answer_of(row.answer))
+
+    def covariance(self, key: Key) -> NDArray[np.float64] | None:
+        """Covariance (3n, 3n) m^2 of a solution; None where none is stored."""
+        with key.part.reading() as connection:
+            row = connection.execute(MATRIX, {"run": key.run, "seq": key.seq}).one()
+        if row.covariance is None or len(row.covariance) != 8 * row.size**2:
+            return None
+        return np.frombuffer(row.covariance, dtype="<f8").reshape(row.size, row.size)
 
     def _key_of(self, keys: Sequence[Key], number: int) -> Key | None:
         """Place of an epoch's number: the k-th solution has at most k, less by those without an answer before it."""

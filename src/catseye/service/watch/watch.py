@@ -114,7 +114,7 @@ class SiteWatch:
         return self._place is not None
 
     def now(self) -> float:
-        """Present MJD."""
+        """Present time of the watch, MJD."""
         return ticks_now(self.clock) / TICKS_PER_DAY
 
     def _journal(self) -> History:
@@ -138,7 +138,7 @@ class SiteWatch:
         return await self._commands().command(name, parameters, who)
 
     async def acknowledge(self, alarm: str, who: str) -> Object:
-        """Acknowledge an alarm."""
+        """Acknowledge an alarm, as a person."""
         return await self._commands().alarm("ACK", alarm, who)
 
     async def shelve(self, alarm: str, who: str, minutes: float) -> Object:
