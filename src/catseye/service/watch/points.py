@@ -86,7 +86,7 @@ def ranger_object(history: History | None, site: SiteMap, name: str, state: Obje
         "kind": place["kind"],
         "station": station,
         "zero": zero,
-        "servo": None,  # no journal holds a mirror's following error; its console does: SRV
+        "servo": None,  # no journal holds the axes' following errors
         "certificates": certificates,
         "commands": commands,
     }

@@ -159,8 +159,9 @@ def _of_shots(
                 query = f"SELECT ticks, {column}, {u or 'NULL'} {where} ORDER BY ticks"
                 rows += connection.execute(text(query), asked | {"run": run})
                 continue
-            bins = f"SELECT AVG(ticks), AVG({column}), AVG({u or 'NULL'}), MIN({column}), MAX({column}) {where}"
-            query = f"{bins} GROUP BY (ticks - :first) / :width ORDER BY 1"
+            u_mean = f"AVG({u or 'CAST(NULL AS FLOAT)'})"
+            bins = f"SELECT AVG(ticks), AVG({column}), {u_mean}, MIN({column}), MAX({column})"
+            query = f"{bins} {where} GROUP BY (ticks - :first) / :width ORDER BY 1"
             rows += connection.execute(text(query), asked | {"run": run, "first": first, "width": width})
     return columns_of((float(ticks) / TICKS_PER_DAY, *map(_real, values)) for ticks, *values in rows)
 

@@ -109,9 +109,10 @@ class Solutions:
             chosen = {f"s{k}": key.seq for k, key in enumerate(group)}
             offsets = {f"o{k}": 3 * at[key.run, key.seq] for k, key in enumerate(group)}
             row = " ".join(f"WHEN :s{k} THEN :o{k}" for k in range(len(group)))
+            at_byte = f"CAST(1 + 8 * (size + 1) * (CASE seq {row} END) AS INTEGER)"
             query = text(
-                f"SELECT seq, size, CASE WHEN seq IN ({_places(chosen)}) THEN substr(covariance, "
-                f"1 + 8 * (size + 1) * (CASE seq {row} END), 8 * (2 * size + 3)) END FROM solutions "
+                f"SELECT seq, size, CASE WHEN seq IN ({_places(chosen)}) THEN substr(covariance, {at_byte}, "
+                "CAST(8 * (2 * size + 3) AS INTEGER)) END FROM solutions "
                 "WHERE run = :run AND seq >= :low AND seq <= :high ORDER BY seq"
             )
             span = {"run": first.run, "low": first.seq, "high": last.seq}
