@@ -35,7 +35,6 @@ EPOCH_VALUES = {
     "refractivity": ("refractivity_ppm", "mean refractivity", "ppm"),
     "variance_factor": ("variance_factor", "variance factor", ""),
 }
-GOOD = ("used", "reference")
 
 
 class Columns(NamedTuple):
@@ -55,15 +54,20 @@ def series_object(
 
     Raises InputError for an unknown name or a bound outside 2 to 20 000.
     """
-    if not 2 <= most <= MOST_BINS:
-        raise InputError(f"most = {most} (expected 2 to {MOST_BINS})")
-    if not 1 <= len(names) <= MOST_NAMES:
-        raise InputError(f"{len(names)} names (expected 1 to {MOST_NAMES})")
+    require_series(names, most)
     rows = []
     for name in names:
         label, unit, columns = _columns(history, name, since, until, most)
         rows.append({"name": name, "label": label, "unit": unit} | binned(columns, most))
     return {"names": rows, "gaps": GAP_S}
+
+
+def require_series(names: Sequence[str], most: int) -> None:
+    """Raise InputError for too many names, or a bound outside 2 to 20 000."""
+    if not 2 <= most <= MOST_BINS:
+        raise InputError(f"most = {most} (expected 2 to {MOST_BINS})")
+    if not 1 <= len(names) <= MOST_NAMES:
+        raise InputError(f"{len(names)} names (expected 1 to {MOST_NAMES})")
 
 
 def binned(columns: "Columns", most: int) -> Object:
