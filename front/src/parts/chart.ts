@@ -109,7 +109,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   function draw(g: CanvasRenderingContext2D, w: number, h: number, c: Palette): void {
     g.font = FONT;
     g.textBaseline = "middle";
-    let [x0, x1, y0, y1] = view ?? bounds;
+    const [x0, x1, y0, y1] = view ?? bounds;
     // Legend, in lines as wide as the picture.
     let [lx, ly] = [4, 10];
     g.textAlign = "left";
@@ -137,10 +137,10 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     const legend = lx > 4 ? ly + 18 : 10;
     // Frame.
     const y = scale(axes.y, y0, y1);
-    let yTicks = y.at(Math.max(2, Math.floor(h / 48)));
+    const yTicks = y.at(Math.max(2, Math.floor(h / 48)));
     const top = legend + 18;
     const left = Math.min(Math.ceil(Math.max(20, ...yTicks.map((t) => g.measureText(t.text).width))) + 10, w * 0.4);
-    const right = w - 12;
+    let right = w - 12;
     const x = scale(axes.x, x0, x1);
     let xTicks = x.at(8);
     const longest = (list: typeof xTicks) => Math.max(...list.map((t) => g.measureText(t.text).width), 1);
@@ -148,21 +148,12 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     const tilted = !!axes.x.categories && longest(xTicks) + 8 > slot;
     if (!axes.x.categories) xTicks = x.at(Math.max(2, Math.floor((right - left) / (longest(xTicks) + 22))));
     const drop = tilted ? Math.min(longest(xTicks), 110) * 0.72 + 14 : 20;
-    const bottom = h - drop - 20;
+    let bottom = h - drop - 20;
+    // A map's frame has the shape of its area.
+    const s = Math.min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
+    if (map()) (right = left + s * (x1 - x0)), (bottom = top + s * (y1 - y0));
     px = (v) => left + ((v - x0) / (x1 - x0)) * (right - left);
     py = (v) => bottom - ((v - y0) / (y1 - y0)) * (bottom - top);
-    if (map()) {
-      const s = Math.min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
-      const [cx, cy] = [(x0 + x1) / 2, (y0 + y1) / 2];
-      const [wide, high] = [(right - left) / s / 2, (bottom - top) / s / 2];
-      [x0, x1, y0, y1] = [cx - wide, cx + wide, cy - high, cy + high];
-      x.low = x0;
-      const [rx, ry] = [scale(axes.x, x0, x1), scale(axes.y, y0, y1)];
-      xTicks = rx.at(Math.floor((right - left) / 60));
-      yTicks = ry.at(Math.floor(h / 60));
-      px = (v) => left + (v - x0) * s;
-      py = (v) => bottom - (v - y0) * s;
-    }
     inner = { left, right, top, bottom };
     scales = { x, y };
     g.lineWidth = 1;
@@ -197,7 +188,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     g.strokeRect(left + 0.5, top + 0.5, right - left - 1, bottom - top - 1);
     g.fillStyle = c.ink;
     g.textAlign = "right";
-    g.fillText(x.title, right, h - 9, w - 8);
+    g.fillText(x.title, right, bottom + drop + 11, w - 8);
     g.textAlign = "left";
     g.fillText(y.title, 4, legend + 6, w - 8);
     g.save();

@@ -25,7 +25,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   const sheet = el("img.ce-sheet", { alt: label });
   const withBeams = button("Beams", "Show or hide beams", () => ((beams = !beams), keys(), dirty()));
   const bar = el("div.ce-bar", {}, ...VIEWS.map(([name, yaw, pitch]) => button(name, `View: ${name.toLowerCase()}`, () => look(yaw, pitch))), withBeams, button("PNG", "Download the picture", () => png(label, composed(2))));
-  const box = el("div.ce-scene", {}, stage, legend, spoken, bar, sheet);
+  const box = el("div.ce-scene", {}, stage, bar, legend, spoken, sheet);
   const tooltip = tip(stage);
 
   let gl: WebGL2RenderingContext | null = null;
@@ -80,7 +80,6 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     });
     shape = ellipsoids(data.points, extent);
     end = data.value ? spread(data.value.values) : 1;
-    camera ??= fitted([0, 0, 0], extent, VIEWS[0]![1], VIEWS[0]![2]);
     stale = true;
   }
 
@@ -134,7 +133,8 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
 
   /** Draw into both canvases at a size and a ratio. */
   function render(w: number, h: number, ratio: number, c: Palette, all: boolean): void {
-    if (!drawn || !camera) return;
+    if (!drawn) return;
+    camera ??= view(VIEWS[0]![1], VIEWS[0]![2], w / h);
     for (const canvas of [live, over]) {
       const [cw, ch] = [Math.round(w * ratio), Math.round(h * ratio)];
       if (canvas.width !== cw || canvas.height !== ch) (canvas.width = cw), (canvas.height = ch);
@@ -256,7 +256,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     g.font = FONT;
     entries.forEach(([text, colour], i) => {
       const [x, y] = [8 + (w / 3) * (i % 3), h + 14 + 22 * Math.floor(i / 3)];
-      g.fillStyle = colour;
+      g.fillStyle = colour || c.paper;
       g.fillRect(x, y - 8, 16, 10);
       g.fillStyle = c.ink;
       g.fillText(text, x + 22, y, w / 3 - 30);
@@ -273,7 +273,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
       const [factor, unit] = scaled(end, data.value.unit);
       for (const s of [-1, 0, 1]) list.push([`${data.value.label} ${s ? (s < 0 ? "≤ \u2212" : "≥ +") + plain(Number((end * factor).toPrecision(2))) : 0} ${unit}`, c.diverging(s), null]);
     }
-    if (data.points.name.some((_, i) => shape.known && Number.isNaN(shape.axes[i]))) list.push(["○ undetermined: no ellipsoid", c.faint, null]);
+    if (data.points.name.some((_, i) => shape.known && Number.isNaN(shape.axes[i]))) list.push(["○ undetermined: no ellipsoid", "", null]);
     const values = beams ? (data.beams?.value ?? []) : [];
     const count = (k: number) => values.filter((w) => grade(w) === k).length;
     if (values.length) {
@@ -289,6 +289,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     legend.replaceChildren(...keyList(colours).map(([text, colour, group]) => {
       const swatch = el("i");
       swatch.style.background = colour;
+      swatch.hidden = !colour;
       if (group === null || data.groups.length < 2) return el("span", {}, swatch, text);
       const press = button("", "Show or hide this group", () => {
         if (!hidden.delete(group)) hidden.add(group);
@@ -331,8 +332,13 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     if (i >= 0) announce(host, data.points.name[i]!, options.select);
   }
   function look(yaw: number, pitch: number): void {
-    camera = fitted([0, 0, 0], extent, yaw, pitch);
+    camera = view(yaw, pitch, width / height || 1.5);
     dirty();
+  }
+  /** Camera for all points and lines. */
+  function view(yaw: number, pitch: number, aspect: number): Camera {
+    const structure = (data.lines ?? []).flatMap((l) => l.x.flatMap((v, i) => [v - centre[0]!, l.y[i]! - centre[1]!, l.z[i]! - centre[2]!]));
+    return fitted([...positions, ...structure], yaw, pitch, aspect);
   }
   function turn(dx: number, dy: number): void {
     camera!.yaw -= dx;
