@@ -1,6 +1,6 @@
 // Table that sorts, filters and holds only the rows in sight in the document; all rows print.
 import type { Column, Num, Table } from "../lib/types";
-import { announce, button, el, onPrint, quantile, type Options, type Part } from "./dom";
+import { announce, button, el, known, onPrint, quantile, type Options, type Part } from "./dom";
 import { csv } from "./download";
 import { decimals, fixed, plain, rounded } from "./number";
 import "./parts.css";
@@ -11,7 +11,6 @@ const HEIGHT = 26; // px of a row where rows are windowed
 const WINDOWED = 120; // rows above which they are
 const PRINTED = 500; // rows built at once while the printer waits
 const order = new Intl.Collator("en", { numeric: true });
-const known = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
 
 /** Text of a cell: decimals by its column, or by its own uncertainty. */
 export function cellText(column: Column, row: number, u?: Column): string {
@@ -239,7 +238,8 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     header();
     paint();
   };
-  const stop = onPrint(() => print(true), () => print(false));
+  const life = new AbortController();
+  onPrint(life.signal, () => print(true), () => print(false));
 
   function update(next: Table): void {
     data = next;
@@ -267,7 +267,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
       } else paint();
     },
     destroy() {
-      stop();
+      life.abort();
       resize.disconnect();
       clearTimeout(typing);
       box.remove();
