@@ -346,11 +346,14 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
       const [x0, x1, y0, y1] = view ?? bounds;
       const [vx, vy] = [(p: number) => x0 + ((p - left) / (right - left)) * (x1 - x0), (p: number) => y0 + ((bottom - p) / (bottom - top)) * (y1 - y0)];
       zoom([vx(drag[0]), vx(drag[1]), vy(drag[3]), vy(drag[2])]);
-    } else if (type === "pointerup" && from) pick((current = nearest(offsetX, offsetY)));
+    } else if (type === "pointerup" && from) {
+      point((current = nearest(offsetX, offsetY)));
+      pick(current);
+    }
     from = drag = null;
     area.hidden = true;
   };
-  canvas.onpointerleave = () => !from && point(-1);
+  canvas.onpointerleave = ({ pointerType }) => pointerType === "mouse" && point(-1); // a finger's tool tip stays
   canvas.onblur = () => point(-1);
   canvas.onkeydown = (event) => {
     const moves: Record<string, number> = { ArrowRight: 1, ArrowLeft: -1, Home: -Infinity, End: Infinity };
