@@ -120,7 +120,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     drawn = gl && drawing(gl, few);
     stale = true;
     if (drawn) return;
-    stage.replaceChildren(el("p.ce-none", {}, "No WebGL 2 in this browser: the table has all points and uncertainties."));
+    stage.replaceChildren(el("p.ce-none", {}, "No WebGL 2 in this browser: the table has all points."));
     self.bar.hidden = true;
   }
 
@@ -259,12 +259,12 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
       const press = button(text, () => {
         if (!hidden.delete(group)) hidden.add(group);
         stale = true;
-        keys();
-        (legend.children[group] as HTMLElement).focus();
+        state();
         dirty();
       });
+      const state = () => (press.ariaPressed = `${!hidden.has(group)}`);
+      state();
       press.prepend(swatch);
-      press.ariaPressed = `${!hidden.has(group)}`;
       return press;
     }));
   }
@@ -390,7 +390,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     measure();
     mark(name === undefined ? -1 : points.name.indexOf(name));
     hover(-1);
-    over.ariaLabel = `${label}. ${points.name.length} points in space; the table has their values. Arrow keys turn, plus and minus zoom, Home shows all, Page Down and Page Up choose a point.`;
+    over.ariaLabel = `${label}. ${points.name.length} points in space; the table has their values. Arrow keys turn, + and − zoom, Home shows all, Page Down and Up choose a point.`;
     keys();
   }
   begin();
