@@ -19,7 +19,7 @@ const [WIDE, HIGH] = [680, 460]; // px of a picture on paper
 type Entry = [text: string, colour: string, group?: number];
 
 export function scene(host: HTMLElement, data: Scene, options: Options = {}): Part<Scene> {
-  const label = options.label ?? "Network";
+  const label = options.label ?? "Scene";
   const legend = el("div.ce-legend");
   const live = el("canvas", { "aria-hidden": true });
   const self = surface(host, "scene", label, { paint, scheme: () => ((stale = true), keys()), raster: () => composed(2) });
@@ -376,7 +376,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   live.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     drawn = null;
-    spoken.textContent = "The browser lost the picture; waiting for it.";
+    spoken.textContent = "The browser lost the picture, waiting.";
   });
   live.addEventListener("webglcontextrestored", () => {
     begin();

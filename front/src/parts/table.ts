@@ -80,7 +80,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   let all = false; // printing
   let count = 0;
 
-  const input = el("input", { type: "search", placeholder: "Filter: text, or u>0.5", "aria-label": `Filter of ${caption}` });
+  const input = el("input", { type: "search", placeholder: "Filter: text or u>0.5", "aria-label": `Filter ${caption}` });
   const size = el("span.ce-faint", { role: "status" });
   const spoken = el("span.ce-hidden", { "aria-live": "polite" });
   const body = el("tbody");
