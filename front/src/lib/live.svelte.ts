@@ -27,9 +27,10 @@ class Live {
   private tries = 0;
   private timer = 0;
   private started = false;
+  private startedAt = $state(0); // 0: not started, or ended
 
-  /** Seconds since the last "state". */
-  silence = $derived(this.state ? Math.max(0, this.tick - this.receivedAt) / 1000 : Infinity);
+  /** Seconds since the last "state", or since the start before the first. */
+  silence = $derived(Math.max(0, this.tick - (this.state ? this.receivedAt : this.startedAt)) / 1000);
   /** Seconds since the coordinator last spoke to the service. */
   coordinatorSilence = $derived.by(() => {
     if (!this.state) return Infinity;
@@ -38,8 +39,8 @@ class Live {
   });
   /** Which part is silent, or null where all speak. */
   silent = $derived.by((): "service" | "coordinator" | null => {
-    if (!this.started) return null;
-    if (this.link === "lost" || this.silence > SILENCE_S) return this.state || this.link === "lost" ? "service" : null;
+    if (!this.startedAt) return null;
+    if (this.link === "lost" || this.silence > SILENCE_S) return "service";
     if (this.state && this.state.source === "live" && (!this.state.connected || this.coordinatorSilence > SILENCE_S))
       return "coordinator";
     return null;
@@ -69,6 +70,7 @@ class Live {
   start(): void {
     if (this.started) return;
     this.started = true;
+    this.startedAt = performance.now();
     setInterval(() => (this.tick = performance.now()), TICK_MS);
     const wake = (): void => {
       this.tick = performance.now();
@@ -77,6 +79,15 @@ class Live {
     addEventListener("online", wake);
     document.addEventListener("visibilitychange", () => document.visibilityState === "visible" && wake());
     this.open();
+  }
+
+  /** End the link: a finished result has nothing live. */
+  stop(): void {
+    clearTimeout(this.timer);
+    const old = this.socket;
+    this.socket = null;
+    old?.close();
+    this.startedAt = 0;
   }
 
   /** Open the link anew: after another token. */

@@ -21,7 +21,7 @@ export interface EpochSummary {
   number: number; mjd: number; points: Num; shots: Num; rejected: Num; variance_factor: Num;
   degrees_of_freedom: Num; refractivity_ppm: Num; verdict: unknown; azimuth: Num; elevation: Num;
 }
-export interface LastShot { number: number; target: string; status: string; range: Num; u_range: Num; misfit: Num }
+export interface LastShot { number: number; target: string; status: string; range: Num; u_range: Num; misfit: Num; w?: Num }
 export interface RangerState {
   name: string; mjd: Num; state: string; word: string; sign: string; trouble: string | null;
   shots: Num; failures: Num; stream: unknown; last: LastShot | null; next: string | null;
