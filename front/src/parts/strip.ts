@@ -102,7 +102,7 @@ function configuration(data: () => StripData, options: StripOptions, width: numb
     width, height: options.height ?? 180, series, bands, legend: { show: false },
     tzDate: (ts) => uPlot.tzDate(new Date(ts * 1000), "Etc/UTC"),
     scales: { x: { time: true, range: span }, y: { range: (_, low, high) => extent(low, high) } },
-    axes: [timeAxis(), { ...plainAxis(), size: 76, label: first.unit ? `${first.label}, ${first.unit}` : first.label, labelSize: 16, labelFont: "12px system-ui, sans-serif", values: (_, ticks) => ticks.map((tick) => short(tick, ticks)) }],
+    axes: [timeAxis(), { ...plainAxis(), size: 76, space: 20, label: first.unit ? `${first.label}, ${first.unit}` : first.label, labelSize: 16, labelFont: "12px system-ui, sans-serif", values: (_, ticks) => ticks.map((tick) => short(tick, ticks)) }],
     cursor: {
       sync: { key: options.group, scales: ["x", null] }, drag: { x: true, y: false, setScale: false, dist: 6 },
       bind: { dblclick: () => () => { options.zoom(null); return null; } },

@@ -2,7 +2,8 @@
 import { dateOf } from "../../lib/time";
 import type { Num, Table } from "../../lib/types";
 import type { Instrument } from "../answers";
-import { number, text } from "./columns";
+import { shown } from "../../parts/number";
+import { text } from "./columns";
 
 export type Word = "valid" | "soon" | "expired" | "future" | "invalid";
 const SOON_D = 30;
@@ -25,6 +26,9 @@ export function age(k: Instrument, now: number): string {
   return days >= 0 ? `, ${days} d left` : `, over for ${-days} d`;
 }
 
+/** Value with its u and unit, or where to look. */
+export const valueOf = (k: Instrument): string => (k.value === null ? "see certificate" : shown(k.value, k.u, k.unit));
+
 const day = (mjd: Num): string => (mjd === null ? "no end" : dateOf(mjd).toISOString().slice(0, 10));
 
 export function calibrationTable(instruments: Instrument[], now: number): Table {
@@ -33,7 +37,7 @@ export function calibrationTable(instruments: Instrument[], now: number): Table 
     columns: [
       text("key", "calibration", instruments.map(keyOf)),
       text("standing", "standing", instruments.map((k) => { const s = standing(k, now); return `${s.sign} ${WORDS[s.word]}${age(k, now)}`; })),
-      number("value", "value", "", instruments.map((k) => k.value), { u: "u" }), number("u", "u", "", instruments.map((k) => k.u)), text("unit", "unit", instruments.map((k) => k.unit)),
+      text("value", "value", instruments.map(valueOf)),
       text("from", "valid from", instruments.map((k) => (k.valid_from === null ? "unknown" : day(k.valid_from)))), text("until", "valid until", instruments.map((k) => day(k.valid_until))),
       text("file", "certificate", instruments.map((k) => k.file), "long"), text("sha256", "SHA-256", instruments.map((k) => k.sha256), "hash"),
     ],

@@ -1,5 +1,6 @@
 // Columns of tables, and the small sums over columns that several pages need.
 import type { Column, Num } from "../../lib/types";
+import { fixed } from "../../parts/number";
 import type { Covariance } from "../answers";
 
 export const number = (key: string, label: string, unit: string, values: Num[], more: Partial<Column> = {}): Column => ({ key, label, unit, kind: "number", values, ...more });
@@ -11,6 +12,10 @@ export const VARIANCE = { x: "xx", y: "yy", z: "zz" } as const;
 export const times = (values: Num[], factor: number): Num[] => values.map((v) => (v === null ? null : v * factor));
 export const known = (value: Num | undefined): value is number => typeof value === "number" && Number.isFinite(value);
 export const root = (values: Num[]): Num[] => values.map((v) => (known(v) && v >= 0 ? Math.sqrt(v) : null));
+
+/** A value without an uncertainty at a number of decimals, with its unit. */
+export const decimal = (value: Num | undefined, digits: number, unit = ""): string => (known(value) ? `${fixed(value, digits)}${unit && `\u00a0${unit}`}` : "unknown");
+export const degrees = (rad: Num | undefined, digits = 3): string => (known(rad) ? `${fixed((rad * 180) / Math.PI, digits)}°` : "unknown");
 
 /** Median of the known values, or null. */
 export function median(values: Num[]): Num {

@@ -57,6 +57,6 @@ export function comparisonTable(c: Comparison): Table {
 export function usualScale(c: Comparison, epoch: EpochDetail): number {
   const most = (values: Num[]): number => values.reduce((a: number, v) => (known(v) && Math.abs(v) > a ? Math.abs(v) : a), 0);
   const moved = most(lengths(c.dx, c.dy, c.dz).filter((_, i) => c.significant[i])), size = most(epoch.points.x);
-  return moved > 0 && size > 0 ? 10 ** Math.round(Math.log10((0.1 * size) / moved)) : 1000;
+  return moved > 0 && size > 0 ? 10 ** Math.floor(Math.log10((0.1 * size) / moved)) : 1000;
 }
 

@@ -25,7 +25,14 @@ export function spectrumChart(s: Samples, most: Num): Chart {
     for (let k = i; k < Math.min(stop, i + step); k++) if ((s.spectrum.amplitude_v[k] ?? 0) > (s.spectrum.amplitude_v[best] ?? 0)) best = k;
     rows.push(best);
   }
-  return { type: "line", x: { label: "frequency", unit: "Hz", values: rows.map((i) => f[i] ?? null) }, y: { label: "amplitude", unit: "dB re 1 V", values: rows.map((i) => decibel(s.spectrum.amplitude_v[i] ?? null)) } };
+  const x: Num[] = rows.map((i) => f[i] ?? null), y: Num[] = rows.map((i) => decibel(s.spectrum.amplitude_v[i] ?? null));
+  const name = x.map(() => ""), group = x.map(() => 0);
+  for (const h of s.harmonics) { // a short stroke above each harmonic, each a line of its own
+    const level = decibel(h.amplitude_v);
+    if (level === null || (most !== null && h.frequency_hz > most)) continue;
+    for (const v of [level + 2, level + 10, null]) x.push(h.frequency_hz), y.push(v), name.push(`harmonic ${h.n}`), group.push(1);
+  }
+  return { type: "line", x: { label: "frequency", unit: "Hz", values: x }, y: { label: "amplitude", unit: "dB re 1 V", values: y }, name, group, groups: ["spectrum", "harmonics"] };
 }
 
 export function harmonicChart(s: Samples): Chart {
