@@ -6,7 +6,7 @@ import { mjdNow } from "./time";
 export type Name = "MODE" | "DROP" | "TAKE" | "STREAM" | "SET" | "PREPARE" | "START" | "CLOCK";
 export interface Field { key: string; label: string; from: "modes" | "rangers" | "targets" | "parameters" | "text"; optional?: boolean }
 export interface Kind {
-  name: Name; title: string; fields: Field[];
+  name: Name; title: string; about: string; fields: Field[];
   parameters: (values: Record<string, string>) => string[];
   effect: (values: Record<string, string>) => string;
 }
@@ -24,31 +24,31 @@ const ranger: Field = { key: "ranger", label: "Ranger", from: "rangers" };
 
 export const kinds: Kind[] = [
   {
-    name: "MODE", title: "Change the mode", fields: [{ key: "mode", label: "Mode", from: "modes" }],
+    name: "MODE", title: "Change the mode", about: "Active plans and fires, passive listens to another client, hold fires nothing.", fields: [{ key: "mode", label: "Mode", from: "modes" }],
     parameters: (v) => [v.mode ?? ""], effect: (v) => MODES[v.mode ?? ""] ?? "Sets the coordinator's mode.",
   },
   {
-    name: "DROP", title: "Leave a ranger out", fields: [ranger], parameters: (v) => [v.ranger ?? ""],
+    name: "DROP", title: "Leave a ranger out", about: "It stays connected and measures no more, until it is taken again.", fields: [ranger], parameters: (v) => [v.ranger ?? ""],
     effect: (v) => `${v.ranger || "The ranger"} stays connected and measures no more, until it is taken again.`,
   },
   {
-    name: "TAKE", title: "Use a ranger again", fields: [ranger], parameters: (v) => [v.ranger ?? ""],
+    name: "TAKE", title: "Use a ranger again", about: "It is made ready, its laser is lit, and it measures again.", fields: [ranger], parameters: (v) => [v.ranger ?? ""],
     effect: (v) => `${v.ranger || "The ranger"} is made ready, its laser is lit, and it measures again.`,
   },
   {
-    name: "STREAM", title: "Stream one target", fields: [ranger, { key: "target", label: "Target (empty: end the stream)", from: "targets", optional: true }],
+    name: "STREAM", title: "Stream one target", about: "A ranger measures one target again and again, or ends that.", fields: [ranger, { key: "target", label: "Target (empty: end the stream)", from: "targets", optional: true }],
     parameters: (v) => (v.target ? [v.ranger ?? "", v.target] : [v.ranger ?? ""]),
     effect: (v) => v.target ? `${v.ranger || "The ranger"} measures ${v.target} again and again, and nothing else.` : `${v.ranger || "The ranger"} ends its stream and goes back to the plan.`,
   },
   {
-    name: "SET", title: "Set a parameter", fields: [{ key: "name", label: "Parameter", from: "parameters" }, { key: "value", label: "Value", from: "text" }],
+    name: "SET", title: "Set a parameter", about: "The value is checked and waits for PREPARE and START.", fields: [{ key: "name", label: "Parameter", from: "parameters" }, { key: "value", label: "Value", from: "text" }],
     parameters: (v) => [v.name ?? "", v.value ?? ""],
     effect: (v) => `The value of ${v.name || "the parameter"} is checked and waits. Nothing changes before START.`,
   },
-  { name: "PREPARE", title: "Check waiting values", fields: [], parameters: () => [], effect: () => "Checks all values that wait, together. Nothing changes before START." },
-  { name: "START", title: "Activate prepared values", fields: [], parameters: () => [], effect: () => "All prepared values become active at once." },
+  { name: "PREPARE", title: "Check waiting values", about: "All values that wait are checked together.", fields: [], parameters: () => [], effect: () => "Checks all values that wait, together. Nothing changes before START." },
+  { name: "START", title: "Activate prepared values", about: "All prepared values become active at once.", fields: [], parameters: () => [], effect: () => "All prepared values become active at once." },
   {
-    name: "CLOCK", title: "Accept the machine's clock", fields: [], parameters: () => ["ACCEPT"],
+    name: "CLOCK", title: "Accept the machine's clock", about: "The count of UTC takes this machine's clock over; where clocks disagreed, firing goes on.", fields: [], parameters: () => ["ACCEPT"],
     effect: () => "The coordinator's count of UTC takes the machine's clock over, and firing may go on. Do this only where that clock is known to be right.",
   },
 ];

@@ -21,7 +21,8 @@ class Live {
   refusal = $state<string | null>(null);
   dropped = $state(0);
   private tick = $state(performance.now());
-  private changedAt = $state(0); // when `received` of the state last grew
+  private heardAt = $state(0); // when the coordinator last spoke, as far as this page knows
+  private base = $state.raw<{ mjd: number; at: number } | null>(null); // the site's time at an instant of this page
   private handlers = new Map<Kind, Set<Handler>>();
   private socket: WebSocket | null = null;
   private tries = 0;
@@ -31,12 +32,8 @@ class Live {
 
   /** Seconds since the last "state", or since the start before the first. */
   silence = $derived(Math.max(0, this.tick - (this.state ? this.receivedAt : this.startedAt)) / 1000);
-  /** Seconds since the coordinator last spoke to the service. */
-  coordinatorSilence = $derived.by(() => {
-    if (!this.state) return Infinity;
-    const before = Math.max(0, (this.state.mjd - this.state.received) * 86400);
-    return Math.max(before, (this.tick - this.changedAt) / 1000);
-  });
+  /** Seconds since the coordinator last spoke to the service: another answer, or anything that it pushed. */
+  coordinatorSilence = $derived(Math.max(0, this.tick - this.heardAt) / 1000);
   /** Which part is silent, or null where all speak. */
   silent = $derived.by((): "service" | "coordinator" | null => {
     if (!this.startedAt) return null;
@@ -47,11 +44,11 @@ class Live {
   });
   stale = $derived(this.silent !== null || !this.state);
   /** MJD of the last word of the silent part. */
-  since = $derived(this.state ? (this.silent === "coordinator" ? this.state.received : this.state.mjd) : null);
+  since = $derived(this.state ? (this.state.received ?? this.state.mjd) : null);
 
   /** The site's UTC now, MJD. */
   now(): number {
-    return this.state ? this.state.mjd + Math.max(0, this.tick - this.receivedAt) / 86_400_000 : mjdNow() + 0 * this.tick;
+    return this.base ? this.base.mjd + Math.max(0, this.tick - this.base.at) / 86_400_000 : mjdNow() + 0 * this.tick;
   }
 
   /** Age in seconds of a value of an instant (MJD), by the site's clock. */
@@ -133,13 +130,19 @@ class Live {
     if (message.kind === "state") this.take(message.data as State);
     else if (message.kind === "lag")
       for (const n of Object.values((message.data as { dropped?: Record<string, number> }).dropped ?? {})) this.dropped += n;
-    else buffers.take(message.kind, message.data);
+    else {
+      this.heardAt = performance.now();
+      buffers.take(message.kind, message.data);
+    }
     for (const handler of this.handlers.get(message.kind) ?? []) handler(message.data);
   }
 
   private take(state: State): void {
     const now = performance.now();
-    if (!this.state || state.received !== this.state.received) this.changedAt = now;
+    if (state.received !== this.state?.received) {
+      this.heardAt = now;
+      this.base = state.mjd == null ? null : { mjd: state.mjd, at: now };
+    }
     this.state = state;
     this.receivedAt = now;
     this.tick = now;

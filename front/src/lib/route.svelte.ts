@@ -9,9 +9,10 @@ function parsed(hash: string): { page: string; query: Record<string, string> } {
   return { page: page || "", query };
 }
 
+/** Address of a page; a wall screen stays one unless the query says otherwise. */
 export function href(page: string, query: Record<string, string | number | null | undefined> = {}): string {
   const parts = new URLSearchParams();
-  for (const [key, value] of Object.entries(query)) if (value != null && value !== "") parts.set(key, String(value));
+  for (const [key, value] of Object.entries({ wall: route.query.wall, ...query })) if (value != null && value !== "") parts.set(key, String(value));
   const text = parts.toString();
   return `#/${page}${text ? `?${text}` : ""}`;
 }
@@ -27,6 +28,11 @@ class Route {
 
   constructor() {
     this.read();
+    if (new URLSearchParams(location.search).get("wall") === "1") { // "?wall=1" is said by people; it belongs into the route
+      const parts = new URLSearchParams({ wall: "1", ...this.query });
+      history.replaceState(null, "", `${location.pathname}#/${this.page}?${parts.toString()}`);
+      this.read();
+    }
     addEventListener("hashchange", () => this.read());
   }
 
@@ -41,8 +47,7 @@ export const route = new Route();
 
 /** Go to a page, as a step of the history; `at` of a replay stays unless the query says another. */
 export function go(page: string, query: Record<string, string | number | null | undefined> = {}): void {
-  const at = "at" in query ? query.at : route.query.at;
-  location.hash = href(page, { ...query, at });
+  location.hash = href(page, { at: route.query.at, ...query });
 }
 
 /** Change parts of this page's query in place, without a step of the history; null takes a part away. */

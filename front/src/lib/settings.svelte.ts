@@ -26,7 +26,7 @@ class Settings {
   zone = $state("site");
   /** Name that commands and acknowledgements go out under. */
   who = $state("");
-  wall = $derived(route.query.wall === "1" || new URLSearchParams(location.search).get("wall") === "1");
+  wall = $derived(route.query.wall === "1");
 
   constructor() {
     Object.assign(this, stored());

@@ -19,21 +19,21 @@ export interface Problem {
 }
 export interface EpochSummary {
   number: number; mjd: number; points: Num; shots: Num; rejected: Num; variance_factor: Num;
-  degrees_of_freedom: Num; refractivity_ppm: Num; verdict: unknown; azimuth: Num; elevation: Num;
+  degrees_of_freedom: Num; refractivity_ppm: Num; verdict: unknown; verdict_text?: string | null; azimuth: Num; elevation: Num;
 }
 export interface LastShot { number: number; target: string; status: string; range: Num; u_range: Num; misfit: Num; w?: Num }
 export interface RangerState {
   name: string; mjd: Num; state: string; word: string; sign: string; trouble: string | null;
-  shots: Num; failures: Num; stream: unknown; last: LastShot | null; next: string | null;
+  shots: Num; failures: Num; stream: unknown; last: LastShot | null; next: string | null; next_mjd?: Num;
 }
 export interface Posture { mjd: number; azimuth: Num; elevation: Num; azimuth_rate: Num; elevation_rate: Num }
 export interface Weather { station: string; mjd: number; temperature_c: Num; pressure_hpa: Num; humidity_percent: Num }
 export interface Sun { azimuth: number; elevation: number; cone: number }
 export interface State {
-  mjd: number; received: number; source: "live" | "journal"; connected: boolean;
+  mjd: Num; received: Num; source: "live" | "journal"; connected: boolean; trouble?: string | null;
   word: string | null; mode: string | null; round: unknown; shots: { numbered: Num; acknowledged: Num } | null;
   clock: unknown; disk: unknown; journal: unknown; lease: unknown;
-  problems: Problem[]; verdict: unknown; epoch: EpochSummary | null; posture: Posture | null;
+  problems: Problem[]; verdict: unknown; verdict_text?: string | null; epoch: EpochSummary | null; posture: Posture | null;
   weather: Weather[]; sun: Sun | null; rangers: RangerState[];
 }
 export interface Shot {

@@ -26,14 +26,28 @@ export function utc(mjd: number | null | undefined, form: "time" | "full" = "tim
 /** The same instant by the wall clock of a zone of the IANA, "hh:mm:ss GMT+1"; null: this browser's zone. */
 export function local(mjd: number | null | undefined, timezone?: string | null): string {
   if (mjd == null || !Number.isFinite(mjd)) return "no time";
-  const format = (zone: string | undefined): string =>
-    new Intl.DateTimeFormat("en-GB", {
-      hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short", timeZone: zone,
-    }).format(dateOf(mjd));
+  return formatOf(timezone ?? undefined).format(dateOf(mjd));
+}
+
+const FORMATS = new Map<string | undefined, Intl.DateTimeFormat>();
+
+/** Format of a zone, made once; in the first English that has a name for it ("EST", "CET"), else with its offset. */
+function formatOf(zone: string | undefined): Intl.DateTimeFormat {
+  const known = FORMATS.get(zone);
+  if (known) return known;
+  const formats = ["en-GB", "en-US", "en-AU", "en-ZA"].map((language) => made(language, zone));
+  const named = formats.find((each) => !each.formatToParts(0).some((part) => part.type === "timeZoneName" && part.value.startsWith("GMT")));
+  const format = named ?? (formats[0] as Intl.DateTimeFormat);
+  FORMATS.set(zone, format);
+  return format;
+}
+
+function made(language: string, zone: string | undefined): Intl.DateTimeFormat {
+  const form: Intl.DateTimeFormatOptions = { hour: "2-digit", minute: "2-digit", second: "2-digit", hourCycle: "h23", timeZoneName: "short" };
   try {
-    return format(timezone ?? undefined);
+    return new Intl.DateTimeFormat(language, { ...form, timeZone: zone });
   } catch {
-    return format(undefined); // a zone that this browser does not know
+    return new Intl.DateTimeFormat(language, form); // a zone that this browser does not know
   }
 }
 

@@ -7,7 +7,7 @@ import type { State } from "./state";
 class View {
   private past = $state.raw<State | null>(null);
   refusal = $state<string | null>(null);
-  state = $derived(route.at === null ? live.state : this.past?.mjd !== undefined ? this.past : null);
+  state = $derived(route.at === null ? live.state : this.past);
   /** Instant of the view, MJD: of the replay, else the site's now. */
   get now(): number {
     return route.at ?? live.now();

@@ -5,6 +5,7 @@ export type Severity = "normal" | "warning" | "alarm" | "off";
 const RANGERS: Record<string, Severity> = {
   measures: "normal", "last shot failed": "normal", idle: "warning", dark: "alarm", suspended: "warning",
   "another's": "warning", "not ready": "warning", "not connected": "alarm", trouble: "warning", "left out": "off",
+  unknown: "off",
 };
 const SITES: Record<string, { severity: Severity; sign: string }> = {
   well: { severity: "normal", sign: "✓" },
@@ -25,7 +26,8 @@ export function severityOfRanger(word: string): Severity {
 }
 
 export function ofSite(word: string | null): { severity: Severity; sign: string } {
-  return (word !== null && SITES[word]) || { severity: "warning", sign: "?" };
+  if (word === null) return { severity: "off", sign: "∅" };
+  return SITES[word] ?? { severity: "warning", sign: "?" };
 }
 
 export function signOf(severity: string): string {
@@ -36,12 +38,12 @@ export function severityOf(text: string): Severity {
   return text === "alarm" ? "alarm" : text === "warning" ? "warning" : "normal";
 }
 
-/** Word, reason, sign and severity of a verdict, which is a word or {word, why}. */
-export function verdictOf(verdict: unknown): { word: string; why: string; severity: Severity; sign: string } | null {
+/** Word, reason, sign and severity of a verdict, which is a word beside its reason, or {word, why}. */
+export function verdictOf(verdict: unknown, why?: string | null): { word: string; why: string; severity: Severity; sign: string } | null {
   const word = typeof verdict === "string" ? verdict : textAt(verdict, "word");
   if (!word) return null;
   const known = VERDICTS[word] ?? { severity: "warning" as const, sign: "?" };
-  return { word, why: textAt(verdict, "why"), ...known };
+  return { word, why: why ?? textAt(verdict, "why"), ...known };
 }
 
 function textAt(value: unknown, key: string): string {

@@ -6,7 +6,7 @@ const SIGHT = 0.42; // rad, whole vertical angle
 /** Column-major 4 x 4 matrix from the scene to clip space. z is up; yaw 0 looks along +y. */
 export function matrixOf(camera: Camera, aspect: number, extent: number): Float32Array {
   const { right, up, back } = axesOf(camera);
-  const f = 1 / Math.tan(SIGHT / 2) / Math.min(1, aspect * 0.9); // narrow pictures show the same width
+  const f = 1 / Math.tan(SIGHT / 2);
   const near = Math.max(camera.distance - 2 * extent, camera.distance * 0.02);
   const far = camera.distance + 2 * extent;
   const rows = [
@@ -57,7 +57,21 @@ export function picked(screen: Float32Array, size: Float32Array, x: number, y: n
   return best;
 }
 
-/** Camera that sees everything, from a direction. */
-export function fitted(centre: number[], extent: number, yaw: number, pitch: number): Camera {
-  return { yaw, pitch, target: [centre[0]!, centre[1]!, centre[2]!], distance: (extent * 0.56) / Math.tan(SIGHT / 2) };
+/** Camera that just sees all points, from a direction; positions x, y, z, unknown ones NaN. */
+export function fitted(positions: ArrayLike<number>, yaw: number, pitch: number, aspect: number): Camera {
+  const camera: Camera = { yaw, pitch, target: [0, 0, 0], distance: 1 };
+  const { right, up, back } = axesOf(camera);
+  const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]] as [number[], number[]];
+  for (let i = 0; i < positions.length; i += 3) {
+    [right, up, back].forEach((axis, k) => {
+      const v = axis[0]! * positions[i]! + axis[1]! * positions[i + 1]! + axis[2]! * positions[i + 2]!;
+      if (v < low[k]!) low[k] = v;
+      if (v > high[k]!) high[k] = v;
+    });
+  }
+  const half = low.map((v, k) => (high[k]! > v ? (high[k]! - v) / 2 : 0));
+  const middle = low.map((v, k) => (v <= high[k]! ? (v + high[k]!) / 2 : 0));
+  camera.target = [0, 1, 2].map((k) => right[k]! * middle[0]! + up[k]! * middle[1]! + back[k]! * middle[2]!) as Camera["target"];
+  camera.distance = (Math.max(half[1]!, half[0]! / aspect, 1e-6) * 1.22) / Math.tan(SIGHT / 2) + half[2]!;
+  return camera;
 }

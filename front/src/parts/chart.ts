@@ -1,61 +1,45 @@
 // Chart on a canvas: marks with uncertainties, hover, keyboard, zoom, downloads, paper.
 import type { Axis, Chart, Column } from "../lib/types";
 import { instant, scale, type Scale } from "./axes";
-import { announce, button, el, extent, onPrint, onScheme, PAPER, palette, tip, type Options, type Palette, type Part } from "./dom";
+import { announce, button, context, el, extent, fill, known, PAPER, pixels, stroke, surface, type Options, type Palette, type Part } from "./dom";
 import { csv, png } from "./download";
 import { marksOf, type Mark } from "./marks";
 import { fixed, plain, shown } from "./number";
 import "./parts.css";
 
-const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 const NEAR = 24; // px from the pointer within which a mark is hovered
-const DENSE = 2500; // marks above which they are small squares
+const CROWDED = 1500; // marks above which they are small squares without uncertainties; those come with the zoom
 const SHEET = 680; // px wide on paper
 const KINDS = { scatter: "Scatter plot", line: "Line chart", bars: "Bar chart", histogram: "Histogram", normal: "Normal probability plot", map: "Map" };
 type View = [x0: number, x1: number, y0: number, y1: number];
 
-/** Outline of the marker of a group about 0, 0; size is half its width. */
+// Outlines of the markers of groups: x, y in tenths of half the width; none: a circle.
+const MARKERS = ["", "-9 -9 9 -9 9 9 -9 9", "0 -12 11 8 -11 8", "0 -13 13 0 0 13 -13 0", "0 12 11 -8 -11 -8", "-4 -12 4 -12 4 -4 12 -4 12 4 4 4 4 12 -4 12 -4 4 -12 4 -12 -4 -4 -4", "-12 0 0 -8 12 0 0 8", "-8 0 0 -12 8 0 0 12"]
+  .map((text) => text.split(" ").map(Number));
+
 function marker(g: CanvasRenderingContext2D, x: number, y: number, group: number, r: number): void {
-  const polygon = (...points: number[]) => {
-    g.moveTo(x + r * points[0]!, y + r * points[1]!);
-    for (let i = 2; i < points.length; i += 2) g.lineTo(x + r * points[i]!, y + r * points[i + 1]!);
-    g.closePath();
-  };
-  switch (group % 8) {
-    case 1: return polygon(-0.9, -0.9, 0.9, -0.9, 0.9, 0.9, -0.9, 0.9);
-    case 2: return polygon(0, -1.2, 1.1, 0.8, -1.1, 0.8);
-    case 3: return polygon(0, -1.3, 1.3, 0, 0, 1.3, -1.3, 0);
-    case 4: return polygon(0, 1.2, 1.1, -0.8, -1.1, -0.8);
-    case 5: return polygon(-0.4, -1.2, 0.4, -1.2, 0.4, -0.4, 1.2, -0.4, 1.2, 0.4, 0.4, 0.4, 0.4, 1.2, -0.4, 1.2, -0.4, 0.4, -1.2, 0.4, -1.2, -0.4, -0.4, -0.4);
-    case 6: return polygon(-1.2, 0, 0, -0.8, 1.2, 0, 0, 0.8);
-    case 7: return polygon(-0.8, 0, 0, -1.2, 0.8, 0, 0, 1.2);
-    default:
-      g.moveTo(x + r, y);
-      g.arc(x, y, r, 0, 7);
-  }
+  const outline = MARKERS[group % 8]!;
+  if (outline.length < 2) return g.arc(x, y, r, 0, 7);
+  for (let i = 0; i < outline.length; i += 2) g.lineTo(x + (r * outline[i]!) / 10, y + (r * outline[i + 1]!) / 10);
 }
 
 export function chart(host: HTMLElement, data: Chart, options: Options = {}): Part<Chart> {
   const label = options.label ?? "Chart";
-  const canvas = el("canvas.ce-live", { tabindex: "0", role: "img" });
-  const plot = el("div.ce-plot", {}, canvas);
+  const self = surface(host, "chart", label, { paint, scheme() {}, raster: () => raster(SHEET, 2.5) });
+  const { canvas, stage, dirty } = self;
   const ring = el("div.ce-ring");
   const area = el("div.ce-area");
-  const spoken = el("span.ce-hidden", { "aria-live": "polite" });
   const reset = button("Reset zoom", "Escape", () => zoom(null));
-  const bar = el("div.ce-bar", {}, reset, button("PNG", "Download the picture", () => png(label, raster(Math.max(width, 640), 2))), button("CSV", "Download the numbers", download));
-  const box = el("div.ce-chart", {}, plot, bar, spoken);
-  const tooltip = tip(plot);
-  plot.append(ring, area);
+  self.bar.append(reset, button("PNG", "Download the picture", () => png(label, raster(Math.max(width, 640), 2))), button("CSV", "Download the numbers", download));
+  self.spoken.classList.add("ce-hidden");
+  stage.append(ring, area);
 
-  let colours: Palette;
   let marks: Mark[] = [];
   let bounds: View = [0, 1, 0, 1];
   let view: View | null = null;
   let chosen: string | null = null;
   let current = -1;
   let width = 0;
-  let frame = 0;
   let end = 1; // of the colours
   let axes: { x: Axis; y: Axis };
   // Of the last picture on the screen, for the pointer:
@@ -73,7 +57,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     for (const m of marks) {
       xs.push(m.x);
       if (m.to !== undefined) xs.push(m.to);
-      if (Number.isNaN(m.y)) continue;
+      if (!known(m.y)) continue;
       ys.push(m.y);
       if (m.u > 0 && data.type !== "normal") ys.push(m.y - m.u, m.y + m.u);
     }
@@ -95,8 +79,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     bounds = [...range(xs, axes.x), ...range(ys, axes.y)];
     if (boxes() && bounds[2] < 0 && !ys.some((y) => y < 0)) bounds[2] = 0;
     if (data.type === "bars" && !axes.x.categories) (bounds[0] -= 0.5), (bounds[1] += 0.5);
-    end = data.value ? extent(data.value.values) : 1;
-    if (data.value && !end) end = 1;
+    end = extent(data.value?.values ?? []);
   }
 
   function tall(w: number): number {
@@ -107,9 +90,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
 
   /** Draw the whole chart into a context of the given size, in CSS pixels; sets what the pointer needs. */
   function draw(g: CanvasRenderingContext2D, w: number, h: number, c: Palette): void {
-    g.font = FONT;
-    g.textBaseline = "middle";
-    let [x0, x1, y0, y1] = view ?? bounds;
+    const [x0, x1, y0, y1] = view ?? bounds;
     // Legend, in lines as wide as the picture.
     let [lx, ly] = [4, 10];
     g.textAlign = "left";
@@ -121,26 +102,21 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
       g.fillText(text, lx + size + 4, ly);
       lx += wide;
     };
-    if (grouped() && !data.value) data.groups!.forEach((name, i) => entry(name, 12, (x) => {
-      g.fillStyle = c.group(i);
-      g.beginPath();
-      marker(g, x + 6, ly, i, 4.5);
-      g.fill();
-    }));
+    if (grouped() && !data.value) data.groups!.forEach((name, i) => entry(name, 12, (x) => fill(g, c.group(i), () => marker(g, x + 6, ly, i, 4.5))));
     if (data.value) {
       const v = scale({ label: data.value.label, unit: data.value.unit }, -end, end);
       const bound = plain(Number((end * v.factor).toPrecision(2)));
       entry(`\u2212${bound} to +${bound}: ${v.title}`, 90, (x) => {
-        for (let i = 0; i < 90; i++) (g.fillStyle = c.diverging(i / 44.5 - 1)), g.fillRect(x + i, ly - 5, 1.5, 10);
+        for (let i = 0; i < 90; i++) fill(g, c.diverging(i / 44.5 - 1), () => g.rect(x + i, ly - 5, 1.5, 10));
       });
     }
     const legend = lx > 4 ? ly + 18 : 10;
     // Frame.
     const y = scale(axes.y, y0, y1);
-    let yTicks = y.at(Math.max(2, Math.floor(h / 48)));
+    const yTicks = y.at(Math.max(2, Math.floor(h / 48)));
     const top = legend + 18;
     const left = Math.min(Math.ceil(Math.max(20, ...yTicks.map((t) => g.measureText(t.text).width))) + 10, w * 0.4);
-    const right = w - 12;
+    let right = w - 12;
     const x = scale(axes.x, x0, x1);
     let xTicks = x.at(8);
     const longest = (list: typeof xTicks) => Math.max(...list.map((t) => g.measureText(t.text).width), 1);
@@ -148,21 +124,12 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     const tilted = !!axes.x.categories && longest(xTicks) + 8 > slot;
     if (!axes.x.categories) xTicks = x.at(Math.max(2, Math.floor((right - left) / (longest(xTicks) + 22))));
     const drop = tilted ? Math.min(longest(xTicks), 110) * 0.72 + 14 : 20;
-    const bottom = h - drop - 20;
+    let bottom = h - drop - 20;
+    // A map's frame has the shape of its area.
+    const s = Math.min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
+    if (map()) (right = left + s * (x1 - x0)), (bottom = top + s * (y1 - y0));
     px = (v) => left + ((v - x0) / (x1 - x0)) * (right - left);
     py = (v) => bottom - ((v - y0) / (y1 - y0)) * (bottom - top);
-    if (map()) {
-      const s = Math.min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
-      const [cx, cy] = [(x0 + x1) / 2, (y0 + y1) / 2];
-      const [wide, high] = [(right - left) / s / 2, (bottom - top) / s / 2];
-      [x0, x1, y0, y1] = [cx - wide, cx + wide, cy - high, cy + high];
-      x.low = x0;
-      const [rx, ry] = [scale(axes.x, x0, x1), scale(axes.y, y0, y1)];
-      xTicks = rx.at(Math.floor((right - left) / 60));
-      yTicks = ry.at(Math.floor(h / 60));
-      px = (v) => left + (v - x0) * s;
-      py = (v) => bottom - (v - y0) * s;
-    }
     inner = { left, right, top, bottom };
     scales = { x, y };
     g.lineWidth = 1;
@@ -197,7 +164,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     g.strokeRect(left + 0.5, top + 0.5, right - left - 1, bottom - top - 1);
     g.fillStyle = c.ink;
     g.textAlign = "right";
-    g.fillText(x.title, right, h - 9, w - 8);
+    g.fillText(x.title, right, bottom + drop + 11, w - 8);
     g.textAlign = "left";
     g.fillText(y.title, 4, legend + 6, w - 8);
     g.save();
@@ -211,102 +178,57 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   const colour = (m: Mark, c: Palette) => (data.value ? (m.value === null ? c.faint : c.diverging(m.value / end)) : c.group(grouped() ? m.group : 0));
 
   function content(g: CanvasRenderingContext2D, c: Palette): void {
-    g.strokeStyle = c.faint;
-    for (const o of data.outline ?? []) {
-      g.beginPath();
-      o.x.forEach((v, i) => g.lineTo(px(v), py(o.y[i]!)));
-      g.stroke();
-    }
-    const seen = marks.filter((m) => {
-      const at = px(m.x);
-      return at >= inner.left - 20 && at <= inner.right + 20 || m.to !== undefined || data.type === "line";
-    });
-    if (boxes()) {
-      for (const m of seen) {
-        const [a, b, t, z] = [...edges(m), py(m.y), py(0)];
-        g.fillStyle = colour(m, c);
-        g.fillRect(a, Math.min(t, z), Math.max(b - a, 1), Math.abs(z - t) || 1);
+    const { left, right, top, bottom } = inner;
+    for (const o of data.outline ?? []) stroke(g, c.faint, 1, () => o.x.forEach((v, i) => g.lineTo(px(v), py(o.y[i]!))));
+    const seen = marks.filter((m) => data.type === "line" || boxes() || Math.abs(px(m.x) - (left + right) / 2) < (right - left) / 2 + 20);
+    const solid = (m: Mark) => {
+      const [[a, b], t, z] = [edges(m), py(m.y), py(0)];
+      g.rect(a, Math.min(t, z), Math.max(b - a, 1), Math.max(Math.abs(z - t), 1));
+    };
+    if (boxes()) for (const m of seen) fill(g, colour(m, c), () => solid(m));
+    if (data.type === "line") (grouped() ? data.groups! : [""]).forEach((_, group) => stroke(g, c.group(group), 1.6, () => {
+      // Broken where a value is unknown.
+      let pen = false;
+      for (const m of seen) if (!grouped() || m.group === group) {
+        if (pen && known(m.y)) g.lineTo(px(m.x), py(m.y));
+        else g.moveTo(px(m.x), py(m.y));
+        pen = known(m.y);
       }
-    } else if (data.type === "line") {
-      // A line for each group, broken where a value is unknown.
-      for (let group = 0; group < (grouped() ? data.groups!.length : 1); group++) {
-        g.strokeStyle = c.group(group);
-        g.lineWidth = 1.6;
-        g.beginPath();
-        let pen = false;
-        for (const m of seen) {
-          if (grouped() && m.group !== group) continue;
-          if (Number.isNaN(m.y)) pen = false;
-          else if (pen) g.lineTo(px(m.x), py(m.y));
-          else g.moveTo(px(m.x), py(m.y)), (pen = true);
-        }
-        g.stroke();
-      }
-    } else if (data.type === "normal" && seen.length > 2) {
+    }));
+    if (data.type === "normal" && seen.length > 2) {
       // Straight line through the quartiles.
-      const [a, b] = [marks[Math.round((marks.length - 1) * 0.25)]!, marks[Math.round((marks.length - 1) * 0.75)]!];
+      const [a, b] = [0.25, 0.75].map((q) => marks[Math.round((marks.length - 1) * q)]!) as [Mark, Mark];
       const slope = (b.y - a.y) / (b.x - a.x || 1);
-      g.strokeStyle = c.faint;
-      g.beginPath();
-      for (const v of [-9, 9]) g.lineTo(px(v), py(a.y + slope * (v - a.x)));
-      g.stroke();
+      stroke(g, c.faint, 1, () => [-9, 9].forEach((v) => g.lineTo(px(v), py(a.y + slope * (v - a.x)))));
     }
-    g.lineWidth = 1;
-    if (data.u && data.type !== "normal" && !map()) {
+    if (data.type !== "normal" && !map() && seen.length < CROWDED) {
       g.globalAlpha = seen.length > 300 ? 0.35 : 0.9;
-      g.strokeStyle = boxes() ? c.ink : c.faint;
-      g.beginPath();
-      for (const m of seen) if (m.u > 0) {
-        const at = boxes() ? (edges(m)[0] + edges(m)[1]) / 2 : px(m.x);
-        g.moveTo(at, py(m.y - m.u));
-        g.lineTo(at, py(m.y + m.u));
-        for (const end of [m.y - m.u, m.y + m.u]) g.moveTo(at - 2.5, py(end)), g.lineTo(at + 2.5, py(end));
-      }
-      g.stroke();
+      stroke(g, boxes() ? c.ink : c.faint, 1, () => {
+        for (const m of seen) if (m.u > 0) {
+          const at = place(m)[0];
+          const [low, high] = [py(m.y - m.u), py(m.y + m.u)];
+          for (const [x, y, z] of [[0, low, high], [2.5, low, low], [2.5, high, high]] as const) g.moveTo(at - x, y), g.lineTo(at + x, z);
+        }
+      });
       g.globalAlpha = 1;
     }
-    if (!boxes()) {
-      const dense = seen.length > DENSE;
-      const r = map() ? Math.min(Math.max(0.42 * Math.sqrt(((inner.right - inner.left) * (inner.bottom - inner.top)) / (seen.length || 1)), 2), 8) : seen.length > 400 ? 2.6 : 3.6;
-      if (data.type !== "line" || seen.length < 80) {
-        if (dense) g.globalAlpha = map() ? 1 : 0.7;
-        for (const m of seen) {
-          if (Number.isNaN(m.y)) continue;
-          g.fillStyle = colour(m, c);
-          if (dense && !map()) {
-            g.fillRect(px(m.x) - 1.2, py(m.y) - 1.2, 2.4, 2.4);
-            continue;
-          }
-          g.beginPath();
-          marker(g, px(m.x), py(m.y), grouped() ? m.group : 0, r);
-          g.fill();
-          if (m.value === null && data.value) (g.strokeStyle = c.ink), g.stroke();
-        }
-        g.globalAlpha = 1;
+    if (!boxes() && (data.type !== "line" || seen.length < 80)) {
+      const dense = seen.length > CROWDED && !map();
+      const r = map() ? Math.min(Math.max(0.42 * Math.sqrt(((right - left) * (bottom - top)) / (seen.length || 1)), 2), 8) : seen.length > 400 ? 2.6 : 3.6;
+      for (const m of seen) if (known(m.y)) {
+        const [x, y] = place(m);
+        g.fillStyle = colour(m, c);
+        if (dense) g.fillRect(x - 1, y - 1, 2, 2);
+        else fill(g, g.fillStyle as string, () => marker(g, x, y, grouped() ? m.group : 0, r));
       }
     }
-    if (data.limits && !map()) {
-      g.strokeStyle = c.bad;
-      g.setLineDash([6, 4]);
-      g.beginPath();
-      for (const limit of data.limits) {
-        const at = data.type === "histogram" ? px(limit) : py(limit);
-        if (data.type === "histogram") g.moveTo(at, inner.top), g.lineTo(at, inner.bottom);
-        else g.moveTo(inner.left, at), g.lineTo(inner.right, at);
-      }
-      g.stroke();
-      g.setLineDash([]);
-    }
-    if (chosen !== null) {
-      g.strokeStyle = c.ink;
-      g.lineWidth = 2;
-      for (const m of seen) if (m.name === chosen && m.name) {
-        g.beginPath();
-        if (boxes()) g.rect(edges(m)[0], Math.min(py(m.y), py(0)), edges(m)[1] - edges(m)[0], Math.abs(py(m.y) - py(0)));
-        else g.arc(px(m.x), py(m.y), 7, 0, 7);
-        g.stroke();
-      }
-    }
+    g.setLineDash([6, 4]);
+    if (!map()) stroke(g, c.bad, 1, () => (data.limits ?? []).forEach((limit) => {
+      if (data.type === "histogram") g.moveTo(px(limit), top), g.lineTo(px(limit), bottom);
+      else g.moveTo(left, py(limit)), g.lineTo(right, py(limit));
+    }));
+    g.setLineDash([]);
+    if (chosen) for (const m of seen) if (m.name === chosen) stroke(g, c.ink, 2, () => (boxes() ? solid(m) : g.arc(...place(m), 7, 0, 7)));
   }
 
   /** Left and right edge of a bar, px; bars of groups at one place stand side by side. */
@@ -320,35 +242,17 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
 
   function raster(w: number, ratio: number): HTMLCanvasElement {
     const picture = el("canvas");
-    const h = tall(w);
-    picture.width = w * ratio;
-    picture.height = h * ratio;
-    const g = picture.getContext("2d")!;
     const c = PAPER();
-    g.scale(ratio, ratio);
-    g.fillStyle = c.paper;
-    g.fillRect(0, 0, w, h);
-    draw(g, w, h, c);
+    draw(context(picture, w, tall(w), ratio, c.paper), w, tall(w), c);
     dirty(); // what the pointer needs belongs to the screen again
     return picture;
   }
 
   function paint(): void {
-    frame = 0;
-    width = plot.clientWidth;
-    if (!width) return;
+    width = stage.clientWidth;
     const h = tall(width);
-    const ratio = Math.min(devicePixelRatio || 1, 2);
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(h * ratio);
     canvas.style.height = `${h}px`;
-    const g = canvas.getContext("2d")!;
-    g.scale(ratio, ratio);
-    draw(g, width, h, colours);
-    if (current >= 0 && document.activeElement === canvas) point(current);
-  }
-  function dirty(): void {
-    frame ||= requestAnimationFrame(paint);
+    draw(context(canvas, width, h, pixels()), width, h, self.colours);
   }
 
   const reading = (axis: Axis, s: Scale, v: number, u?: number) =>
@@ -368,7 +272,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     let best = -1;
     let least = NEAR;
     marks.forEach((m, i) => {
-      if (Number.isNaN(m.y)) return;
+      if (!known(m.y)) return;
       let d = Math.hypot(px(m.x) - x, py(m.y) - y);
       if (boxes()) {
         const [a, b] = edges(m);
@@ -380,16 +284,16 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   }
 
   function place(m: Mark): [number, number] {
-    return [boxes() ? (edges(m)[0] + edges(m)[1]) / 2 : px(m.x), py(m.y)];
+    const [a, b] = boxes() ? edges(m) : [px(m.x), px(m.x)];
+    return [(a + b) / 2, py(m.y)];
   }
 
   function point(i: number): void {
     const m = marks[i];
     ring.hidden = !m;
-    if (!m) return tooltip.hide();
-    const [x, y] = place(m);
+    const [x, y] = m ? place(m) : [0, 0];
     ring.style.translate = `${x}px ${y}px`;
-    tooltip.show(x, y, lines(m));
+    self.show(x, y, m ? lines(m) : []);
   }
 
   function zoom(next: View | null): void {
@@ -424,10 +328,6 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   // Pointer: hover, click, drag to zoom.
   let from: [number, number] | null = null;
   const zooms = () => data.type === "scatter" || data.type === "line";
-  const at = (event: PointerEvent): [number, number] => {
-    const r = canvas.getBoundingClientRect();
-    return [event.clientX - r.left, event.clientY - r.top];
-  };
   const span = (a: [number, number], b: [number, number]) => {
     const [l, r] = [Math.max(Math.min(a[0], b[0]), inner.left), Math.min(Math.max(a[0], b[0]), inner.right)];
     const flat = Math.abs(a[1] - b[1]) < 12; // along x alone
@@ -436,12 +336,12 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   };
   canvas.onpointerdown = (event) => {
     if (event.button) return;
-    from = at(event);
+    from = self.at(event);
     if (zooms()) canvas.setPointerCapture(event.pointerId);
   };
   canvas.onpointermove = (event) => {
     if (!px) return;
-    const to = at(event);
+    const to = self.at(event);
     if (from && zooms() && Math.abs(to[0] - from[0]) > 6) {
       const { l, r, t, e } = span(from, to);
       area.hidden = false;
@@ -450,7 +350,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     } else point((current = nearest(...to)));
   };
   canvas.onpointerup = (event) => {
-    const to = at(event);
+    const to = self.at(event);
     if (!area.hidden && from) {
       const { l, r, t, e } = span(from, to);
       const [x0, x1, y0, y1] = view ?? bounds;
@@ -477,38 +377,27 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     } else if (move !== undefined && marks.length) {
       // Along x, among the marks in sight.
       const [x0, x1] = view ?? bounds;
-      const row = marks.map((_, i) => i).filter((i) => !Number.isNaN(marks[i]!.y) && marks[i]!.x >= x0 && marks[i]!.x <= x1).sort((i, j) => marks[i]!.x - marks[j]!.x);
+      const row = marks.map((_, i) => i).filter((i) => known(marks[i]!.y) && marks[i]!.x >= x0 && marks[i]!.x <= x1).sort((i, j) => marks[i]!.x - marks[j]!.x);
       const k = row.indexOf(current);
       current = row[Math.min(Math.max(k < 0 && move > 0 ? 0 : k + move, 0), row.length - 1)] ?? -1;
       point(current);
-      if (current >= 0) spoken.textContent = lines(marks[current]!).join(", ");
+      if (current >= 0) self.spoken.textContent = lines(marks[current]!).join(", ");
     } else return;
     event.preventDefault();
   };
-
-  const sheet = el("img.ce-sheet", { alt: label });
-  const stop = [
-    onPrint(() => (sheet.src = raster(SHEET, 2.5).toDataURL()), () => sheet.removeAttribute("src")),
-    onScheme(() => ((colours = palette(host)), dirty())),
-  ];
-  plot.append(sheet);
-  const resize = new ResizeObserver(() => plot.clientWidth !== width && dirty());
 
   function update(next: Chart): void {
     data = next;
     measure();
     current = -1;
-    box.classList.toggle("ce-zooms", zooms());
+    stage.classList.toggle("ce-zooms", zooms());
     canvas.setAttribute("aria-label", `${label}. ${KINDS[data.type]} of ${axes.y.label} against ${axes.x.label}, ${marks.length} marks. Left and right arrows move among them.`);
     point(-1);
     dirty();
   }
-  host.append(box);
   area.hidden = true;
   reset.hidden = true;
-  colours = palette(host);
   update(data);
-  resize.observe(plot);
   return {
     update,
     select(name) {
@@ -516,11 +405,6 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
       chosen = name;
       dirty();
     },
-    destroy() {
-      cancelAnimationFrame(frame);
-      resize.disconnect();
-      for (const end of stop) end();
-      box.remove();
-    },
+    destroy: self.destroy,
   };
 }

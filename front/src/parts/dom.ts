@@ -28,32 +28,14 @@ export function announce(host: HTMLElement, name: string, select?: (name: string
   select?.(name);
 }
 
-/** Tool tip inside a positioned box; at x, y of the box, turned back where it would leave it. */
-export function tip(box: HTMLElement): { show(x: number, y: number, lines: string[]): void; hide(): void } {
-  const element = el("div.ce-tip", { "aria-hidden": "true" });
-  element.hidden = true;
-  box.append(element);
-  return {
-    show(x, y, lines) {
-      element.replaceChildren(...lines.map((line, i) => el(i ? "span" : "b", {}, line)));
-      element.hidden = false;
-      const { offsetWidth: w, offsetHeight: h } = element;
-      element.style.left = `${Math.max(0, x + 14 + w > box.clientWidth ? x - w - 10 : x + 14)}px`;
-      element.style.top = `${Math.max(0, y + 14 + h > box.clientHeight ? y - h - 8 : y + 14)}px`;
-    },
-    hide() {
-      element.hidden = true;
-    },
-  };
-}
+export const known = (value: unknown): value is number => Number.isFinite(value);
 
 // Colours ------------------------------------------------------------------------------------------------------------
 // The light scheme; used on paper, and where the page defines no variables.
 const LIGHT = {
-  ink: "#1d2a35", faint: "#5d6a75", line: "#d5dde3", soft: "#f4f6f8", paper: "#ffffff", accent: "#1f5a99",
-  good: "#1e7f68", doubtful: "#9a6400", bad: "#b3262f",
-  c0: "#0072b2", c1: "#d55e00", c2: "#008f6b", c3: "#b0578f", c4: "#8a6d00", c5: "#3f97d0", c6: "#5b4fa8", c7: "#6b6b6b",
-  low: "#2166ac", mid: "#d9d9d9", high: "#b2182b",
+  ink: "#1b2227", faint: "#525c64", line: "#d3d9de", paper: "#fff", accent: "#1d5691", doubtful: "#7d5000", bad: "#a8281b",
+  c0: "#0068a8", c1: "#c35200", c2: "#00805c", c3: "#b0568a", c4: "#846400", c5: "#2a83b8", c6: "#5b4a9e", c7: "#5a6269",
+  low: "#2166ac", mid: "#b4babf", high: "#b2182b",
 };
 export type Palette = Record<keyof typeof LIGHT, string> & { group(i: number): string; diverging(t: number): string };
 
@@ -74,8 +56,7 @@ let pixel: CanvasRenderingContext2D | null = null;
 
 /** Red, green, blue, 0 to 255, of any colour that CSS knows. */
 export function channels(colour: string): number[] {
-  pixel ??= Object.assign(document.createElement("canvas"), { width: 1, height: 1 }).getContext("2d", { willReadFrequently: true });
-  if (!pixel) return [128, 128, 128];
+  pixel ??= el("canvas", { width: "1", height: "1" }).getContext("2d", { willReadFrequently: true })!;
   pixel.fillStyle = colour;
   pixel.fillRect(0, 0, 1, 1);
   return [...pixel.getImageData(0, 0, 1, 1).data.slice(0, 3)];
@@ -96,40 +77,122 @@ export function palette(host: HTMLElement): Palette {
   return finished(colours);
 }
 
-/** Call when the scheme of colours changes; returns what ends it. */
-export function onScheme(call: () => void): () => void {
-  const media = matchMedia("(prefers-color-scheme: dark)");
-  const observer = new MutationObserver(call);
-  media.addEventListener("change", call);
-  observer.observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
-  return () => {
-    media.removeEventListener("change", call);
-    observer.disconnect();
-  };
-}
-
-/** Call before and after printing, once each; returns what ends it. */
-export function onPrint(before: () => void, after: () => void): () => void {
+/** Call before and after printing, once each, until the signal. */
+export function onPrint(signal: AbortSignal, before: () => void, after: () => void): void {
   const media = matchMedia("print");
   let printing = false;
-  const start = () => {
-    if (!printing) before();
-    printing = true;
+  const turn = (to: boolean) => {
+    if (to !== printing) (to ? before : after)();
+    printing = to;
   };
-  const end = () => {
-    if (printing) after();
-    printing = false;
-  };
-  const change = () => (media.matches ? start() : end());
-  addEventListener("beforeprint", start);
-  addEventListener("afterprint", end);
-  media.addEventListener("change", change);
-  return () => {
-    removeEventListener("beforeprint", start);
-    removeEventListener("afterprint", end);
-    media.removeEventListener("change", change);
-  };
+  addEventListener("beforeprint", () => turn(true), { signal });
+  addEventListener("afterprint", () => turn(false), { signal });
+  media.addEventListener("change", () => turn(media.matches), { signal });
 }
+
+/** What charts and scenes share: a picture painted when something changed, its tool tip, buttons, spoken text, paper. */
+export interface Surface {
+  canvas: HTMLCanvasElement; // takes pointer and keys
+  stage: HTMLElement;
+  bar: HTMLElement;
+  spoken: HTMLElement;
+  colours: Palette;
+  show(x: number, y: number, lines: string[]): void; // tool tip; no lines: none
+  dirty(): void;
+  at(event: PointerEvent): [number, number];
+  signal: AbortSignal;
+  destroy(): void;
+}
+
+export function surface(host: HTMLElement, kind: "chart" | "scene", label: string, hooks: { paint(now: number): void; scheme(): void; raster(): HTMLCanvasElement }): Surface {
+  const life = new AbortController();
+  const { signal } = life;
+  const canvas = el("canvas.ce-live", { tabindex: "0", role: "img" });
+  const tip = el("div.ce-tip", { "aria-hidden": "true" });
+  const stage = el("div.ce-stage", {}, canvas, tip);
+  const sheet = el("img.ce-sheet", { alt: label });
+  const [bar, spoken] = [el("div.ce-bar"), el("p.ce-said", { "aria-live": "polite" })];
+  const box = el(`div.ce-${kind}`, {}, stage, bar, spoken, sheet);
+  let frame = 0;
+  let width = 0;
+  const self: Surface = {
+    canvas, stage, bar, spoken, signal,
+    colours: palette(host),
+    show(x, y, lines) {
+      tip.hidden = !lines.length;
+      tip.replaceChildren(...lines.map((line, i) => el(i ? "span" : "b", {}, line)));
+      const { offsetWidth: w, offsetHeight: h } = tip;
+      tip.style.left = `${Math.max(0, x + 14 + w > stage.clientWidth ? x - w - 10 : x + 14)}px`;
+      tip.style.top = `${Math.max(0, y + 14 + h > stage.clientHeight ? y - h - 8 : y + 14)}px`;
+    },
+    dirty() {
+      frame ||= requestAnimationFrame((now) => {
+        frame = 0;
+        width = stage.clientWidth;
+        if (width) hooks.paint(now);
+      });
+    },
+    at(event) {
+      const r = canvas.getBoundingClientRect();
+      return [event.clientX - r.left, event.clientY - r.top];
+    },
+    destroy() {
+      cancelAnimationFrame(frame);
+      resize.disconnect();
+      scheme.disconnect();
+      life.abort();
+      box.remove();
+    },
+  };
+  tip.hidden = true;
+  const change = () => {
+    self.colours = palette(host);
+    hooks.scheme();
+    self.dirty();
+  };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", change, { signal });
+  const scheme = new MutationObserver(change);
+  scheme.observe(document.documentElement, { attributeFilter: ["data-theme"] });
+  onPrint(signal, () => {
+    sheet.src = hooks.raster().toDataURL();
+    self.dirty();
+  }, () => sheet.removeAttribute("src"));
+  const resize = new ResizeObserver(() => stage.clientWidth !== width && self.dirty());
+  host.append(box);
+  resize.observe(stage);
+  return self;
+}
+
+export const FONT = "12px system-ui, 'Segoe UI', Roboto, Arial, sans-serif";
+
+/** Size a canvas and clear it; its context in CSS pixels. */
+export function context(canvas: HTMLCanvasElement, width: number, height: number, ratio: number, ground?: string): CanvasRenderingContext2D {
+  canvas.width = Math.round(width * ratio);
+  canvas.height = Math.round(height * ratio);
+  const g = canvas.getContext("2d")!;
+  g.scale(ratio, ratio);
+  if (ground) fill(g, ground, () => g.rect(0, 0, width, height));
+  g.font = FONT;
+  g.textBaseline = "middle";
+  return g;
+}
+
+/** Stroke or fill a path. */
+export function stroke(g: CanvasRenderingContext2D, colour: string, width: number, path: () => void): void {
+  g.strokeStyle = colour;
+  g.lineWidth = width;
+  g.beginPath();
+  path();
+  g.stroke();
+}
+export function fill(g: CanvasRenderingContext2D, colour: string, path: () => void): void {
+  g.fillStyle = colour;
+  g.beginPath();
+  path();
+  g.fill();
+}
+
+export const pixels = (): number => Math.min(devicePixelRatio || 1, 2);
 
 /** Ticks at 1, 2 or 5 times a power of ten between two values, and the decimals they need. */
 export function ticks(low: number, high: number, most: number): { at: number[]; digits: number; step: number } {
@@ -150,12 +213,12 @@ export function scaled(size: number, unit: string): [number, string] {
 }
 
 /** Quantile of numbers, 0 to 1; nulls do not count; NaN of none. */
-export function quantile(values: (number | null)[], q: number): number {
-  const sorted = Float64Array.from(values.filter((v): v is number => v !== null && Number.isFinite(v))).sort();
+export function quantile(values: unknown[], q: number): number {
+  const sorted = Float64Array.from(values.filter(known)).sort();
   return sorted[Math.round(q * (sorted.length - 1))] ?? NaN;
 }
 
 /** Size at which a diverging scale ends: nearly all values are inside. */
-export function extent(values: (number | null)[]): number {
-  return quantile(values.map((v) => (v === null ? null : Math.abs(v))), 0.98) || 1;
+export function extent(values: unknown[]): number {
+  return quantile(values.filter(known).map(Math.abs), 0.98) || 1;
 }

@@ -1,10 +1,8 @@
 // Marks of a chart: what is drawn, hovered and chosen, from its columns.
 import type { Chart, Num } from "../lib/types";
-import { quantile, ticks } from "./dom";
+import { known, quantile, ticks } from "./dom";
 
 export interface Mark { x: number; y: number; u: number; value: Num; group: number; name: string; row: number; to?: number /* right edge of a bin */ }
-
-const finite = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
 
 /** Quantile of the standard normal distribution. Source: Abramowitz and Stegun 26.2.23, error below 4.5e-4. */
 export function normalQuantile(p: number): number {
@@ -35,11 +33,11 @@ export function marksOf(data: Chart): Mark[] {
     x, y, row, u: data.u?.[row] ?? NaN, value: data.value?.values[row] ?? null, group: data.group?.[row] ?? 0, name: data.name?.[row] ?? "",
   });
   if (data.type === "histogram") {
-    const { edges, counts } = bins(xs.filter(finite));
+    const { edges, counts } = bins(xs.filter(known));
     return counts.map((count, i) => ({ ...make(-1, edges[i]!, count), to: edges[i + 1]! }));
   }
   if (data.type === "normal") {
-    const rows = xs.map((_, i) => i).filter((i) => finite(xs[i])).sort((i, j) => xs[i]! - xs[j]!);
+    const rows = xs.map((_, i) => i).filter((i) => known(xs[i])).sort((i, j) => xs[i]! - xs[j]!);
     return rows.map((row, i) => make(row, normalQuantile((i + 0.625) / (rows.length + 0.25)), xs[row]!));
   }
   const line = data.type === "line";
@@ -48,8 +46,8 @@ export function marksOf(data: Chart): Mark[] {
   const marks: Mark[] = [];
   xs.forEach((x, row) => {
     const y = ys[row];
-    if (!finite(x)) return;
-    if (finite(y)) marks.push(make(row, many ? x + (((row * 0.618034) % 1) - 0.5) * 0.6 : x, y));
+    if (!known(x)) return;
+    if (known(y)) marks.push(make(row, many ? x + (((row * 0.618034) % 1) - 0.5) * 0.6 : x, y));
     else if (line) marks.push(make(row, x, NaN));
   });
   return marks;

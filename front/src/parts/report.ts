@@ -7,21 +7,9 @@ import { table } from "./table";
 import "./parts.css";
 import "./result.css";
 
-export interface ReportOptions { embedded?: boolean /* in the dashboard: with title, verdict, cards and passages; no addresses */ }
+export interface ReportOptions { embedded?: boolean /* within the dashboard: links of the contents do not change the address */ }
 
-const SIGNS = { good: "✓", doubtful: "!", failed: "✕" };
-const WORDS = { good: "Good", doubtful: "Doubtful", failed: "Failed" };
 const PRINTED = 1000; // rows up to which a folded table is opened for the printer
-
-/** Title, verdict, cards and passages; in a report's file the writers put the same as static text. */
-function top(data: Report): HTMLElement {
-  return el("div", {},
-    el("h1", {}, data.title), el("p.faint", {}, data.subtitle),
-    data.verdict && el(`p.verdict.${data.verdict.word}`, {}, el("b", {}, `${SIGNS[data.verdict.word]} ${WORDS[data.verdict.word]}.`), ` ${data.verdict.why}`),
-    data.cards.length > 0 && el("div.cards", {}, ...data.cards.map((card) => el("div.card", {}, el("span.name", {}, card.name), el("b", {}, card.value), el("span", {}, card.remark)))),
-    data.passages.length > 0 && el("dl.passages", {}, ...data.passages.flatMap((passage) => [el("dt", {}, passage.title), el("dd", {}, passage.text)])),
-  );
-}
 
 export function report(host: HTMLElement, data: Report, options: ReportOptions = {}): { destroy(): void } {
   const parts: { host: HTMLElement; select(name: string | null): void; destroy(): void }[] = [];
@@ -96,7 +84,7 @@ export function report(host: HTMLElement, data: Report, options: ReportOptions =
     return link;
   });
   const nav = links.length > 1 && el("nav", { "aria-label": "Contents" }, ...links);
-  const box = el("div.catseye-result", {}, options.embedded ? top(data) : null, nav,
+  const box = el("div.catseye-result", {}, nav,
     ...data.sections.map((section) => el("section", { id: section.id, "aria-label": section.title }, el("h2", {}, section.title), ...section.blocks.map(node))));
   const follow = (event: Event) => {
     chosen = (event as CustomEvent<{ name: string }>).detail.name;
@@ -104,7 +92,8 @@ export function report(host: HTMLElement, data: Report, options: ReportOptions =
   };
   box.addEventListener("catseye:select", follow);
   let opened: HTMLDetailsElement[] = [];
-  const stop = onPrint(() => {
+  const life = new AbortController();
+  onPrint(life.signal, () => {
     opened = [...box.querySelectorAll<HTMLDetailsElement>("details[data-short]:not([open])")];
     for (const details of opened) details.open = true;
     for (const element of [...late.keys()]) if (!element.closest("details:not([open])")) build(element);
@@ -114,7 +103,7 @@ export function report(host: HTMLElement, data: Report, options: ReportOptions =
   host.append(box);
   return {
     destroy() {
-      stop();
+      life.abort();
       near.disconnect();
       for (const p of parts) p.destroy();
       box.remove();

@@ -1,6 +1,6 @@
 // Table that sorts, filters and holds only the rows in sight in the document; all rows print.
 import type { Column, Num, Table } from "../lib/types";
-import { announce, button, el, onPrint, type Options, type Part } from "./dom";
+import { announce, button, el, known, onPrint, quantile, type Options, type Part } from "./dom";
 import { csv } from "./download";
 import { decimals, fixed, plain, rounded } from "./number";
 import "./parts.css";
@@ -11,7 +11,6 @@ const HEIGHT = 26; // px of a row where rows are windowed
 const WINDOWED = 120; // rows above which they are
 const PRINTED = 500; // rows built at once while the printer waits
 const order = new Intl.Collator("en", { numeric: true });
-const known = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
 
 /** Text of a cell: decimals by its column, or by its own uncertainty. */
 export function cellText(column: Column, row: number, u?: Column): string {
@@ -20,7 +19,23 @@ export function cellText(column: Column, row: number, u?: Column): string {
   if (!known(value)) return "unknown";
   if (column.digits !== undefined) return fixed(value, column.digits);
   const s = u?.values[row];
-  return known(s) && s > 0 ? rounded(value, decimals(s)) : plain(value);
+  return known(s) && s > 0 ? rounded(value, decimals(s)) : value && Math.abs(value) < 1e-9 ? plain(value) : fixed(value, common(column));
+}
+
+const places = new WeakMap<Column, number>();
+
+/** Decimals for all values of a column that states none: four significant digits of nearly the largest, no needless zeros. */
+function common(column: Column): number {
+  let digits = places.get(column);
+  if (digits === undefined) {
+    const values = column.values.filter(known);
+    const size = quantile(values.map(Math.abs), 0.9);
+    const most = size > 0 ? Math.min(Math.max(3 - Math.floor(Math.log10(size)), 0), 10) : 0;
+    digits = 0;
+    while (digits < most && !values.every((v) => Math.abs(v - Number(v.toFixed(digits))) < 1e-12 * Math.abs(v))) digits++;
+    places.set(column, digits);
+  }
+  return digits;
 }
 
 type Test = (row: number) => boolean;
@@ -78,7 +93,9 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   const named = () => data.columns.find((c) => c.key === data.name) ?? null;
   const nameOf = (row: number) => String(named()?.values[row] ?? "");
   const windowed = () => !all && count > WINDOWED;
-  const cell = (c: Column, row: number) => cellText(c, row, c.u ? data.columns.find((d) => d.key === c.u) : undefined);
+  // A column of uncertainties is rounded by itself.
+  const ruler = (c: Column) => data.columns.find((d) => d.key === c.u) ?? (data.columns.some((d) => d.u === c.key) ? c : undefined);
+  const cell = (c: Column, row: number) => cellText(c, row, ruler(c));
   const text = (row: number) => (texts[row] ??= data.columns.map((c) => cell(c, row)).join(" ").toLowerCase());
 
   function header(): void {
@@ -142,7 +159,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
       for (let from = 0; from < rows.length; from += PRINTED) body.append(...rows.slice(from, from + PRINTED).map((_, i) => line(from + i)));
       return;
     }
-    const seen = Math.ceil((scroll.clientHeight || 400) / HEIGHT);
+    const seen = Math.ceil(Math.max(scroll.clientHeight, 480) / HEIGHT);
     const from = Math.min(Math.max(0, Math.floor(scroll.scrollTop / HEIGHT) - 6), Math.max(0, rows.length - seen));
     const to = Math.min(rows.length, from + seen + 12);
     const lines = [];
@@ -221,7 +238,8 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     header();
     paint();
   };
-  const stop = onPrint(() => print(true), () => print(false));
+  const life = new AbortController();
+  onPrint(life.signal, () => print(true), () => print(false));
 
   function update(next: Table): void {
     data = next;
@@ -232,6 +250,8 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     input.hidden = count < 6;
     arrange();
   }
+  const resize = new ResizeObserver(() => windowed() && paint());
+  resize.observe(scroll);
   if (options.rows) scroll.style.maxHeight = `${(options.rows + 1) * HEIGHT + 10}px`;
   host.append(box);
   update(data);
@@ -247,7 +267,8 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
       } else paint();
     },
     destroy() {
-      stop();
+      life.abort();
+      resize.disconnect();
       clearTimeout(typing);
       box.remove();
     },
