@@ -8,8 +8,8 @@ export type Kind = "state" | "shot" | "epoch" | "event" | "posture" | "weather" 
 type Handler = (data: unknown) => void;
 
 const KINDS: Kind[] = ["state", "shot", "epoch", "event", "posture", "weather"];
-const SILENCE_S = 1.75; // with the tick below: greyed within 2 s of the last word
-const TICK_MS = 200;
+const SILENCE_S = 1.65; // with the tick below: greyed within 2 s of the last word
+const TICK_MS = 150;
 const BACKOFF_S = [0.25, 0.5, 1, 2, 4]; // the last one again and again
 
 class Live {
