@@ -1,10 +1,11 @@
 // Chart on a canvas: marks with uncertainties, hover, keyboard, zoom, downloads, paper.
 import type { Axis, Chart, Column } from "../lib/types";
 import { instant, scale, type Scale } from "./axes";
-import { announce, button, context, el, extent, fill, known, PAPER, pixels, stroke, surface, type Options, type Palette, type Part } from "./dom";
+import { announce, button, context, el, extent, fill, paper, pixels, segment, set, stroke, surface, type Options, type Palette, type Part } from "./dom";
 import { csv, png } from "./download";
 import { marksOf, type Mark } from "./marks";
 import { fixed, plain, shown } from "./number";
+import { abs, ceil, clamp, floor, hypot, known, max, min, round, sqrt } from "./maths";
 import "./parts.css";
 
 const NEAR = 24; // px from the pointer within which a mark is hovered
@@ -29,17 +30,18 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   const { canvas, stage, dirty } = self;
   const ring = el("div.ce-ring");
   const area = el("div.ce-area");
-  const reset = button("Reset zoom", "Escape", () => zoom(null));
-  self.bar.append(reset, button("PNG", "Download the picture", () => png(label, raster(Math.max(width, 640), 2))), button("CSV", "Download the numbers", download));
+  const reset = button("Reset zoom", () => zoom(null));
+  self.bar.append(reset, button("PNG", () => png(label, raster(max(self.width(), 640), 2))), button("CSV", download));
   self.spoken.classList.add("ce-hidden");
   stage.append(ring, area);
 
+  // Kinds of charts, set by the data:
+  let scatter: boolean, line: boolean, bars: boolean, histogram: boolean, normal: boolean, map: boolean, boxes: boolean, grouped: boolean, zooms: boolean;
   let marks: Mark[] = [];
   let bounds: View = [0, 1, 0, 1];
   let view: View | null = null;
   let chosen: string | null = null;
   let current = -1;
-  let width = 0;
   let end = 1; // of the colours
   let axes: { x: Axis; y: Axis };
   // Of the last picture on the screen, for the pointer:
@@ -47,11 +49,12 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   let inner = { left: 0, right: 1, top: 0, bottom: 1 };
   let scales: { x: Scale; y: Scale };
 
-  const map = () => data.type === "map";
-  const boxes = () => data.type === "bars" || data.type === "histogram";
-  const grouped = () => (data.groups?.length ?? 0) > 1 && data.type !== "histogram";
 
   function measure(): void {
+    [scatter, line, bars, histogram, normal, map] = ["scatter", "line", "bars", "histogram", "normal", "map"].map((type) => type === data.type) as [boolean, boolean, boolean, boolean, boolean, boolean];
+    boxes = bars || histogram;
+    zooms = scatter || line;
+    grouped = (data.groups?.length ?? 0) > 1 && !histogram;
     marks = marksOf(data);
     const xs: number[] = [], ys: number[] = [];
     for (const m of marks) {
@@ -59,50 +62,52 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
       if (m.to !== undefined) xs.push(m.to);
       if (!known(m.y)) continue;
       ys.push(m.y);
-      if (m.u > 0 && data.type !== "normal") ys.push(m.y - m.u, m.y + m.u);
+      if (m.u > 0 && !normal) ys.push(m.y - m.u, m.y + m.u);
     }
-    if (boxes()) ys.push(0);
-    if (map()) for (const o of data.outline ?? []) xs.push(...o.x), ys.push(...o.y);
-    else (data.type === "histogram" ? xs : ys).push(...(data.limits ?? []));
+    if (boxes) ys.push(0);
+    if (map) for (const o of data.outline ?? []) xs.push(...o.x), ys.push(...o.y);
+    else (histogram ? xs : ys).push(...(data.limits ?? []));
     const range = (values: number[], axis?: Axis): [number, number] => {
       if (axis?.categories) return [-0.5, axis.categories.length - 0.5];
       let low = Infinity, high = -Infinity;
-      for (const v of values) (low = Math.min(low, v)), (high = Math.max(high, v));
+      for (const v of values) (low = min(low, v)), (high = max(high, v));
       if (low > high) return [0, 1];
-      const pad = high > low ? (high - low) * 0.05 : Math.abs(low) * 0.1 || 1;
+      const pad = high > low ? (high - low) * 0.05 : abs(low) * 0.1 || 1;
       return [low - pad, high + pad];
     };
     axes = {
-      x: data.type === "normal" ? { label: "expected of a normal distribution", unit: "σ" } : data.x,
-      y: data.type === "normal" ? data.x : (data.y ?? { label: "number", unit: "" }),
+      x: normal ? { label: "expected of a normal distribution", unit: "σ" } : data.x,
+      y: normal ? data.x : (data.y ?? { label: "number", unit: "" }),
     };
     bounds = [...range(xs, axes.x), ...range(ys, axes.y)];
-    if (boxes() && bounds[2] < 0 && !ys.some((y) => y < 0)) bounds[2] = 0;
-    if (data.type === "bars" && !axes.x.categories) (bounds[0] -= 0.5), (bounds[1] += 0.5);
+    if (boxes && bounds[2] < 0 && !ys.some((y) => y < 0)) bounds[2] = 0;
+    if (bars && !axes.x.categories) (bounds[0] -= 0.5), (bounds[1] += 0.5);
     end = extent(data.value?.values ?? []);
   }
 
   function tall(w: number): number {
-    if (!map()) return Math.round(Math.min(Math.max(w * 0.5, 250), 400));
+    if (!map) return round(clamp(w * 0.5, 250, 400));
     const [x0, x1, y0, y1] = bounds;
-    return Math.round(Math.min(Math.max(((w - 70) * (y1 - y0)) / (x1 - x0) + 100, 260), Math.max(w * 0.8, 360), 640));
+    return round(min(max(((w - 70) * (y1 - y0)) / (x1 - x0) + 100, 260), max(w * 0.8, 360), 640));
   }
 
   /** Draw the whole chart into a context of the given size, in CSS pixels; sets what the pointer needs. */
   function draw(g: CanvasRenderingContext2D, w: number, h: number, c: Palette): void {
     const [x0, x1, y0, y1] = view ?? bounds;
+    const wide = (text: string) => g.measureText(text).width;
+    const longest = (list: { text: string }[]) => max(...list.map((t) => wide(t.text)), 20);
     // Legend, in lines as wide as the picture.
     let [lx, ly] = [4, 10];
     g.textAlign = "left";
     const entry = (text: string, size: number, symbol: (x: number) => void) => {
-      const wide = g.measureText(text).width + size + 20;
-      if (lx > 4 && lx + wide > w) (lx = 4), (ly += 18);
+      const room = wide(text) + size + 20;
+      if (lx > 4 && lx + room > w) (lx = 4), (ly += 18);
       symbol(lx);
       g.fillStyle = c.ink;
       g.fillText(text, lx + size + 4, ly);
-      lx += wide;
+      lx += room;
     };
-    if (grouped() && !data.value) data.groups!.forEach((name, i) => entry(name, 12, (x) => fill(g, c.group(i), () => marker(g, x + 6, ly, i, 4.5))));
+    if (grouped && !data.value) data.groups!.forEach((name, i) => entry(name, 12, (x) => fill(g, c.group(i), () => marker(g, x + 6, ly, i, 4.5))));
     if (data.value) {
       const v = scale({ label: data.value.label, unit: data.value.unit }, -end, end);
       const bound = plain(Number((end * v.factor).toPrecision(2)));
@@ -113,21 +118,21 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     const legend = lx > 4 ? ly + 18 : 10;
     // Frame.
     const y = scale(axes.y, y0, y1);
-    const yTicks = y.at(Math.max(2, Math.floor(h / 48)));
+    const yTicks = y.at(max(2, floor(h / 48)));
     const top = legend + 18;
-    const left = Math.min(Math.ceil(Math.max(20, ...yTicks.map((t) => g.measureText(t.text).width))) + 10, w * 0.4);
+    const left = min(ceil(longest(yTicks)) + 10, w * 0.4);
     let right = w - 12;
     const x = scale(axes.x, x0, x1);
     let xTicks = x.at(8);
-    const longest = (list: typeof xTicks) => Math.max(...list.map((t) => g.measureText(t.text).width), 1);
-    const slot = (right - left) / Math.max(xTicks.length, 1);
+
+    const slot = (right - left) / max(xTicks.length, 1);
     const tilted = !!axes.x.categories && longest(xTicks) + 8 > slot;
-    if (!axes.x.categories) xTicks = x.at(Math.max(2, Math.floor((right - left) / (longest(xTicks) + 22))));
-    const drop = tilted ? Math.min(longest(xTicks), 110) * 0.72 + 14 : 20;
+    if (!axes.x.categories) xTicks = x.at(max(2, floor((right - left) / (longest(xTicks) + 22))));
+    const drop = tilted ? min(longest(xTicks), 110) * 0.72 + 14 : 20;
     let bottom = h - drop - 20;
     // A map's frame has the shape of its area.
-    const s = Math.min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
-    if (map()) (right = left + s * (x1 - x0)), (bottom = top + s * (y1 - y0));
+    const s = min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
+    if (map) (right = left + s * (x1 - x0)), (bottom = top + s * (y1 - y0));
     px = (v) => left + ((v - x0) / (x1 - x0)) * (right - left);
     py = (v) => bottom - ((v - y0) / (y1 - y0)) * (bottom - top);
     inner = { left, right, top, bottom };
@@ -138,25 +143,24 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     g.beginPath();
     g.textAlign = "right";
     for (const t of yTicks) {
-      const at = Math.round(py(t.value)) + 0.5;
+      const at = round(py(t.value)) + 0.5;
       if (at > bottom + 1 || at < top - 1) continue;
-      g.moveTo(left, at);
-      g.lineTo(right, at);
+      segment(g, left, at, right, at);
       g.fillText(t.text, left - 6, at, left - 6);
     }
     let free = -Infinity;
     for (const t of xTicks) {
-      const at = Math.round(px(t.value)) + 0.5;
+      const at = round(px(t.value)) + 0.5;
       if (at < left - 1 || at > right + 1) continue;
-      if (!axes.x.categories || data.type === "scatter") g.moveTo(at, top), g.lineTo(at, bottom);
-      const wide = tilted ? 13 : g.measureText(t.text).width + 6;
-      if (at - wide / 2 < free) continue;
-      free = at + wide / 2;
+      if (!axes.x.categories || scatter) segment(g, at, top, at, bottom);
+      const half = tilted ? 6.5 : wide(t.text) / 2 + 3;
+      if (at - half < free) continue;
+      free = at + half;
       g.save();
       g.translate(at, bottom + 12);
       if (tilted) g.rotate(-0.8);
       g.textAlign = tilted ? "right" : "center";
-      g.fillText(t.text, tilted ? 4 : Math.min(0, w - at - g.measureText(t.text).width / 2), 0, tilted ? 110 : undefined);
+      g.fillText(t.text, tilted ? 4 : min(0, w - at - half), 0, tilted ? 110 : undefined);
       g.restore();
     }
     g.stroke();
@@ -175,96 +179,95 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     g.restore();
   }
 
-  const colour = (m: Mark, c: Palette) => (data.value ? (m.value === null ? c.faint : c.diverging(m.value / end)) : c.group(grouped() ? m.group : 0));
+  const colour = (m: Mark, c: Palette) => (data.value ? (m.value === null ? c.faint : c.diverging(m.value / end)) : c.group(grouped ? m.group : 0));
 
   function content(g: CanvasRenderingContext2D, c: Palette): void {
     const { left, right, top, bottom } = inner;
     for (const o of data.outline ?? []) stroke(g, c.faint, 1, () => o.x.forEach((v, i) => g.lineTo(px(v), py(o.y[i]!))));
-    const seen = marks.filter((m) => data.type === "line" || boxes() || Math.abs(px(m.x) - (left + right) / 2) < (right - left) / 2 + 20);
+    const seen = marks.filter((m) => line || boxes || abs(px(m.x) - (left + right) / 2) < (right - left) / 2 + 20);
     const solid = (m: Mark) => {
       const [[a, b], t, z] = [edges(m), py(m.y), py(0)];
-      g.rect(a, Math.min(t, z), Math.max(b - a, 1), Math.max(Math.abs(z - t), 1));
+      g.rect(a, min(t, z), max(b - a, 1), max(abs(z - t), 1));
     };
-    if (boxes()) for (const m of seen) fill(g, colour(m, c), () => solid(m));
-    if (data.type === "line") (grouped() ? data.groups! : [""]).forEach((_, group) => stroke(g, c.group(group), 1.6, () => {
+    if (boxes) for (const m of seen) fill(g, colour(m, c), () => solid(m));
+    if (line) (grouped ? data.groups! : [""]).forEach((_, group) => stroke(g, c.group(group), 1.6, () => {
       // Broken where a value is unknown.
       let pen = false;
-      for (const m of seen) if (!grouped() || m.group === group) {
+      for (const m of seen) if (!grouped || m.group === group) {
         if (pen && known(m.y)) g.lineTo(px(m.x), py(m.y));
         else g.moveTo(px(m.x), py(m.y));
         pen = known(m.y);
       }
     }));
-    if (data.type === "normal" && seen.length > 2) {
+    if (normal && seen.length > 2) {
       // Straight line through the quartiles.
-      const [a, b] = [0.25, 0.75].map((q) => marks[Math.round((marks.length - 1) * q)]!) as [Mark, Mark];
+      const [a, b] = [0.25, 0.75].map((q) => marks[round((marks.length - 1) * q)]!) as [Mark, Mark];
       const slope = (b.y - a.y) / (b.x - a.x || 1);
       stroke(g, c.faint, 1, () => [-9, 9].forEach((v) => g.lineTo(px(v), py(a.y + slope * (v - a.x)))));
     }
-    if (data.type !== "normal" && !map() && seen.length < CROWDED) {
+    if (!normal && !map && seen.length < CROWDED) {
       g.globalAlpha = seen.length > 300 ? 0.35 : 0.9;
-      stroke(g, boxes() ? c.ink : c.faint, 1, () => {
+      stroke(g, boxes ? c.ink : c.faint, 1, () => {
         for (const m of seen) if (m.u > 0) {
           const at = place(m)[0];
           const [low, high] = [py(m.y - m.u), py(m.y + m.u)];
-          for (const [x, y, z] of [[0, low, high], [2.5, low, low], [2.5, high, high]] as const) g.moveTo(at - x, y), g.lineTo(at + x, z);
+          for (const [x, y, z] of [[0, low, high], [2.5, low, low], [2.5, high, high]] as const) segment(g, at - x, y, at + x, z);
         }
       });
       g.globalAlpha = 1;
     }
-    if (!boxes() && (data.type !== "line" || seen.length < 80)) {
-      const dense = seen.length > CROWDED && !map();
-      const r = map() ? Math.min(Math.max(0.42 * Math.sqrt(((right - left) * (bottom - top)) / (seen.length || 1)), 2), 8) : seen.length > 400 ? 2.6 : 3.6;
+    if (!boxes && (!line || seen.length < 80)) {
+      const dense = seen.length > CROWDED && !map;
+      const r = map ? clamp(0.42 * sqrt(((right - left) * (bottom - top)) / (seen.length || 1)), 2, 8) : seen.length > 400 ? 2.6 : 3.6;
       for (const m of seen) if (known(m.y)) {
         const [x, y] = place(m);
         g.fillStyle = colour(m, c);
         if (dense) g.fillRect(x - 1, y - 1, 2, 2);
-        else fill(g, g.fillStyle as string, () => marker(g, x, y, grouped() ? m.group : 0, r));
+        else fill(g, g.fillStyle as string, () => marker(g, x, y, grouped ? m.group : 0, r));
       }
     }
     g.setLineDash([6, 4]);
-    if (!map()) stroke(g, c.bad, 1, () => (data.limits ?? []).forEach((limit) => {
-      if (data.type === "histogram") g.moveTo(px(limit), top), g.lineTo(px(limit), bottom);
-      else g.moveTo(left, py(limit)), g.lineTo(right, py(limit));
+    if (!map) stroke(g, c.bad, 1, () => (data.limits ?? []).forEach((limit) => {
+      if (histogram) segment(g, px(limit), top, px(limit), bottom);
+      else segment(g, left, py(limit), right, py(limit));
     }));
     g.setLineDash([]);
-    if (chosen) for (const m of seen) if (m.name === chosen) stroke(g, c.ink, 2, () => (boxes() ? solid(m) : g.arc(...place(m), 7, 0, 7)));
+    if (chosen) for (const m of seen) if (m.name === chosen) stroke(g, c.ink, 2, () => (boxes ? solid(m) : g.arc(...place(m), 7, 0, 7)));
   }
 
   /** Left and right edge of a bar, px; bars of groups at one place stand side by side. */
   function edges(m: Mark): [number, number] {
     if (m.to !== undefined) return [px(m.x) + 0.5, px(m.to) - 0.5];
-    const slot = Math.abs(px(1) - px(0)) * 0.8;
-    const side = grouped() ? data.groups!.length : 1;
-    const a = px(m.x) - slot / 2 + (grouped() ? (slot / side) * m.group : 0);
-    return [a, a + Math.max(slot / side - 1, 1)];
+    const slot = abs(px(1) - px(0)) * 0.8;
+    const side = grouped ? data.groups!.length : 1;
+    const a = px(m.x) - slot / 2 + (grouped ? (slot / side) * m.group : 0);
+    return [a, a + max(slot / side - 1, 1)];
   }
 
   function raster(w: number, ratio: number): HTMLCanvasElement {
     const picture = el("canvas");
-    const c = PAPER();
+    const c = paper(host);
     draw(context(picture, w, tall(w), ratio, c.paper), w, tall(w), c);
     dirty(); // what the pointer needs belongs to the screen again
     return picture;
   }
 
-  function paint(): void {
-    width = stage.clientWidth;
+  function paint(width: number): void {
     const h = tall(width);
     canvas.style.height = `${h}px`;
     draw(context(canvas, width, h, pixels()), width, h, self.colours);
   }
 
   const reading = (axis: Axis, s: Scale, v: number, u?: number) =>
-    axis.categories ? (axis.categories[Math.round(v)] ?? "") : axis.unit === "MJD" ? instant(v).replace("T", " ") + " UTC"
+    axis.categories ? (axis.categories[round(v)] ?? "") : axis.unit === "MJD" ? instant(v).replace("T", " ") + " UTC"
       : shown(v * s.factor, u === undefined || Number.isNaN(u) ? null : u * s.factor, s.unit);
 
   function lines(m: Mark): string[] {
     if (m.to !== undefined) return [`${plain(m.y)} of ${data.x.values?.length}`, `${data.x.label} ${reading(axes.x, scales.x, m.x)} to ${reading(axes.x, scales.x, m.to)}`];
-    const text = [`${axes.y.label} ${reading(axes.y, scales.y, m.y, data.type === "normal" ? NaN : m.u)}`];
-    text.unshift(`${axes.x.label} ${data.type === "normal" ? fixed(m.x, 2) : reading(axes.x, scales.x, m.x)}`);
+    const text = [`${axes.y.label} ${reading(axes.y, scales.y, m.y, normal ? NaN : m.u)}`];
+    text.unshift(`${axes.x.label} ${normal ? fixed(m.x, 2) : reading(axes.x, scales.x, m.x)}`);
     if (data.value) text.push(`${data.value.label} ${shown(m.value, null, data.value.unit)}`);
-    if (grouped()) text.push(data.groups![m.group] ?? "");
+    if (grouped) text.push(data.groups![m.group] ?? "");
     return m.name ? [m.name, ...text] : text;
   }
 
@@ -273,8 +276,8 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     let least = NEAR;
     marks.forEach((m, i) => {
       if (!known(m.y)) return;
-      let d = Math.hypot(px(m.x) - x, py(m.y) - y);
-      if (boxes()) {
+      let d = hypot(px(m.x) - x, py(m.y) - y);
+      if (boxes) {
         const [a, b] = edges(m);
         d = x < a ? a - x : x > b ? x - b : 0;
       }
@@ -284,7 +287,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   }
 
   function place(m: Mark): [number, number] {
-    const [a, b] = boxes() ? edges(m) : [px(m.x), px(m.x)];
+    const [a, b] = boxes ? edges(m) : [px(m.x), px(m.x)];
     return [(a + b) / 2, py(m.y)];
   }
 
@@ -312,37 +315,36 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
   }
 
   function download(): void {
-    const column = (key: string, axis: { label: string; unit: string }, values: Column["values"]): Column => ({ key, ...axis, kind: "number", values });
-    const categories = data.x.categories;
-    const xs = data.x.values ?? categories?.map((_, i) => i) ?? [];
-    csv(label, { columns: [
-      ...(data.name ? [column("name", { label: "name", unit: "" }, data.name)] : []),
-      column("x", { label: data.x.label, unit: data.x.unit }, categories ? xs.map((v) => (v === null ? null : (categories[v] ?? v))) : xs),
-      ...(data.y ? [column("y", { label: data.y.label, unit: data.y.unit }, data.y.values ?? [])] : []),
-      ...(data.u ? [column("u", { label: "standard uncertainty", unit: (data.y ?? data.x).unit }, data.u)] : []),
-      ...(data.value ? [column("value", data.value, data.value.values)] : []),
-      ...(data.group ? [column("group", { label: "group", unit: "" }, data.group.map((k) => data.groups?.[k] ?? k))] : []),
-    ] });
+    const { x, y, value } = data;
+    const xs = x.values ?? x.categories!.map((_, i) => i);
+    const list: [label: string, unit: string, values?: Column["values"]][] = [
+      ["name", "", data.name],
+      [x.label, x.unit, x.categories ? xs.map((v) => x.categories![v!] ?? v) : xs],
+      [y?.label ?? "", y?.unit ?? "", y?.values],
+      ["standard uncertainty", (y ?? x).unit, data.u],
+      [value?.label ?? "", value?.unit ?? "", value?.values],
+      ["group", "", data.group?.map((k) => data.groups?.[k] ?? k)],
+    ];
+    csv(label, { columns: list.filter((c) => c[2]).map(([label, unit, values]) => ({ key: label, label, unit, kind: "number", values: values! })) });
   }
 
   // Pointer: hover, click, drag to zoom.
   let from: [number, number] | null = null;
-  const zooms = () => data.type === "scatter" || data.type === "line";
   const span = (a: [number, number], b: [number, number]) => {
-    const [l, r] = [Math.max(Math.min(a[0], b[0]), inner.left), Math.min(Math.max(a[0], b[0]), inner.right)];
-    const flat = Math.abs(a[1] - b[1]) < 12; // along x alone
-    const [t, e] = flat ? [inner.top, inner.bottom] : [Math.max(Math.min(a[1], b[1]), inner.top), Math.min(Math.max(a[1], b[1]), inner.bottom)];
+    const [l, r] = [max(min(a[0], b[0]), inner.left), clamp(a[0], b[0], inner.right)];
+    const flat = abs(a[1] - b[1]) < 12; // along x alone
+    const [t, e] = flat ? [inner.top, inner.bottom] : [max(min(a[1], b[1]), inner.top), clamp(a[1], b[1], inner.bottom)];
     return { l, r, t, e };
   };
   canvas.onpointerdown = (event) => {
     if (event.button) return;
-    from = self.at(event);
-    if (zooms()) canvas.setPointerCapture(event.pointerId);
+    from = [event.offsetX, event.offsetY];
+    if (zooms) canvas.setPointerCapture(event.pointerId);
   };
   canvas.onpointermove = (event) => {
     if (!px) return;
-    const to = self.at(event);
-    if (from && zooms() && Math.abs(to[0] - from[0]) > 6) {
+    const to: [number, number] = [event.offsetX, event.offsetY];
+    if (from && zooms && abs(to[0] - from[0]) > 6) {
       const { l, r, t, e } = span(from, to);
       area.hidden = false;
       Object.assign(area.style, { left: `${l}px`, width: `${r - l}px`, top: `${t}px`, height: `${e - t}px` });
@@ -350,7 +352,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     } else point((current = nearest(...to)));
   };
   canvas.onpointerup = (event) => {
-    const to = self.at(event);
+    const to: [number, number] = [event.offsetX, event.offsetY];
     if (!area.hidden && from) {
       const { l, r, t, e } = span(from, to);
       const [x0, x1, y0, y1] = view ?? bounds;
@@ -369,7 +371,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     const move = moves[event.key];
     if (event.key === "Escape" && view) zoom(null);
     else if (event.key === "Enter") pick(current);
-    else if ((event.key === "+" || event.key === "-") && zooms()) {
+    else if ((event.key === "+" || event.key === "-") && zooms) {
       const [x0, x1, y0, y1] = view ?? bounds;
       const middle = marks[current]?.x ?? (x0 + x1) / 2;
       const f = event.key === "+" ? 0.5 : 2;
@@ -379,7 +381,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
       const [x0, x1] = view ?? bounds;
       const row = marks.map((_, i) => i).filter((i) => known(marks[i]!.y) && marks[i]!.x >= x0 && marks[i]!.x <= x1).sort((i, j) => marks[i]!.x - marks[j]!.x);
       const k = row.indexOf(current);
-      current = row[Math.min(Math.max(k < 0 && move > 0 ? 0 : k + move, 0), row.length - 1)] ?? -1;
+      current = row[clamp(k < 0 && move > 0 ? 0 : k + move, 0, row.length - 1)] ?? -1;
       point(current);
       if (current >= 0) self.spoken.textContent = lines(marks[current]!).join(", ");
     } else return;
@@ -390,8 +392,8 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     data = next;
     measure();
     current = -1;
-    stage.classList.toggle("ce-zooms", zooms());
-    canvas.setAttribute("aria-label", `${label}. ${KINDS[data.type]} of ${axes.y.label} against ${axes.x.label}, ${marks.length} marks. Left and right arrows move among them.`);
+    stage.classList.toggle("ce-zooms", zooms);
+    set(canvas, { "aria-label": `${label}. ${KINDS[data.type]}: ${axes.y.label} against ${axes.x.label}, ${marks.length} marks. Left and right arrows move among them.` });
     point(-1);
     dirty();
   }

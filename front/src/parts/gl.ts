@@ -1,4 +1,5 @@
 // WebGL 2 programs of a scene: ellipsoids, dots, beams and lines; three calls draw everything.
+import { hypot, max, min, sqrt } from "./maths";
 /** Arrays of n points and s segments, in this order:
  * positions n x 3; matrices n x 9; colours n x 4, 0 to 255, alpha 0 hidden; hollow n, 1 a ring instead of a dot;
  * ends of segments s x 6; their points s x 2; their colours s x 4; their widths s, px times 10.
@@ -11,12 +12,12 @@ export interface Drawn {
 
 /** Vertices and triangles of an icosahedron, each face divided into four where asked. */
 export function icosphere(divided: boolean): { vertices: number[]; faces: number[] } {
-  const t = (1 + Math.sqrt(5)) / 2;
+  const t = (1 + sqrt(5)) / 2;
   const points: number[][] = [];
   for (const a of [-1, 1]) for (const b of [-t, t]) points.push([a, b, 0], [0, a, b], [b, 0, a]);
   // Faces are the triples of neighbours, 2 apart; in the order that shows its front outside.
   let faces: number[] = [];
-  const near = (i: number, j: number) => Math.hypot(...points[i]!.map((v, k) => v - points[j]![k]!)) < 2.1;
+  const near = (i: number, j: number) => hypot(...points[i]!.map((v, k) => v - points[j]![k]!)) < 2.1;
   for (let i = 0; i < 12; i++) for (let j = i + 1; j < 12; j++) for (let k = j + 1; k < 12; k++) {
     if (!near(i, j) || !near(j, k) || !near(i, k)) continue;
     const [p, q, r] = [points[i]!, points[j]!, points[k]!] as [number[], number[], number[]];
@@ -26,7 +27,7 @@ export function icosphere(divided: boolean): { vertices: number[]; faces: number
   if (divided) {
     const middle = new Map<number, number>();
     const between = (i: number, j: number) => {
-      const key = Math.min(i, j) * 64 + Math.max(i, j);
+      const key = min(i, j) * 64 + max(i, j);
       if (!middle.has(key)) middle.set(key, points.push(points[i]!.map((v, k) => v + points[j]![k]!)) - 1);
       return middle.get(key)!;
     };
@@ -38,7 +39,7 @@ export function icosphere(divided: boolean): { vertices: number[]; faces: number
     }
     faces = finer;
   }
-  return { vertices: points.flatMap((p) => p.map((v) => v / Math.hypot(...p))), faces };
+  return { vertices: points.flatMap((p) => p.map((v) => v / hypot(...p))), faces };
 }
 
 // Normals by the inverse transpose: the matrix has orthogonal columns, so that is each column over its square.
@@ -51,10 +52,10 @@ void main(){v=k;r=h;gl_Position=m*vec4(o,1);gl_Position.z-=.0004*gl_Position.w;g
 const DISC = `in vec4 v;flat in float r;out vec4 o;
 void main(){float d=length(gl_PointCoord-.5)*2.;if(d>1.||(r>0.&&d<.62))discard;o=vec4(v.rgb,1);}`;
 // A segment as a strip of two triangles, so that lines have a width.
-const LINE = `uniform mat4 m;uniform vec2 z;uniform float s,l;in vec2 p;in vec3 a,b;in vec2 g;in vec4 k;in float t;out vec4 v;
+const LINE = `uniform mat4 m;uniform vec2 z;uniform float l;in vec2 p;in vec3 a,b;in vec2 g;in vec4 k;in float t;out vec4 v;
 void main(){vec4 x=m*vec4(a,1),y=m*vec4(b,1);x.w=max(x.w,1e-3);y.w=max(y.w,1e-3);vec2 d=(y.xy/y.w-x.xy/x.w)*z;d=d/max(length(d),1e-6);
 bool h=l>=0.&&(g.x==l||g.y==l);v=k;if(h)v.a=1.;else if(l>=0.)v.a*=.35;
-gl_Position=mix(x,y,p.x);gl_Position.xy+=vec2(-d.y,d.x)*p.y*(t*.1+(h?.6:0.))*s/z*gl_Position.w;if(k.a==0.)gl_Position=vec4(2,2,2,1);}`;
+gl_Position=mix(x,y,p.x);gl_Position.xy+=vec2(-d.y,d.x)*p.y*(t*.1+(h?.6:0.))/z*gl_Position.w;if(k.a==0.)gl_Position=vec4(2,2,2,1);}`;
 const FLAT = `in vec4 v;out vec4 o;void main(){o=v;}`;
 
 /** Programs and buffers in a context; null where a program cannot be made. */
@@ -62,8 +63,7 @@ export function drawing(gl: WebGL2RenderingContext, divided: boolean): Drawn | n
   const program = (vertex: string, fragment: string) => {
     const p = gl.createProgram();
     for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
-      const shader = gl.createShader(type);
-      if (!shader) return null;
+      const shader = gl.createShader(type)!;
       gl.shaderSource(shader, `#version 300 es\nprecision highp float;${text}`);
       gl.compileShader(shader);
       gl.attachShader(p, shader);
@@ -132,7 +132,6 @@ export function drawing(gl: WebGL2RenderingContext, divided: boolean): Drawn | n
       gl.depthMask(false);
       const set = use(lines, lineArray);
       set("z", ...size);
-      set("s", ratio);
       set("l", selected);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, segments);
       gl.depthMask(true);

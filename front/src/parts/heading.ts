@@ -15,3 +15,15 @@ export function heading(data: Report): HTMLElement {
     data.passages.length > 0 && el("dl.passages", {}, ...data.passages.flatMap((passage) => [el("dt", {}, passage.title), el("dd", {}, passage.text)])),
   );
 }
+
+/** Let links to sections scroll and leave the address as it is, which belongs to the dashboard's pages; returns what ends it. */
+export function scrolling(host: HTMLElement): () => void {
+  const click = (event: MouseEvent) => {
+    const link = (event.target as Element).closest("a")?.getAttribute("href");
+    if (!link?.startsWith("#")) return;
+    event.preventDefault();
+    document.getElementById(link.slice(1))?.scrollIntoView();
+  };
+  host.addEventListener("click", click);
+  return () => host.removeEventListener("click", click);
+}
