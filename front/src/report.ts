@@ -21,7 +21,7 @@ async function start(): Promise<void> {
     const data = await unpacked(source.textContent ?? "");
     host.textContent = "";
     report(host, data);
-    if (location.hash.length > 1) document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
+    if (location.hash.length > 1) document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView({ behavior: "instant" });
   } catch (error) {
     host.textContent = `The data of this report cannot be shown: ${String(error)}.`;
     host.className = "bad";

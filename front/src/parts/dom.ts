@@ -219,7 +219,8 @@ export function ticks(low: number, high: number, most: number): { at: number[]; 
   const power = floor(log10(raw));
   const step = [1, 2, 5, 10].map((f) => f * 10 ** power).find((s) => s >= raw * 0.9999) ?? raw;
   const at: number[] = [];
-  for (let i = ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) at.push(i * step || 0);
+  const first = ceil(low / step - 1e-9);
+  for (let k = 0; k < 50 && (first + k) * step <= high + 1e-9 * step; k++) at.push((first + k) * step || 0);
   return { at, digits: max(0, -floor(log10(step) + 1e-9)), step };
 }
 

@@ -10,7 +10,7 @@ function save(name: string, blob: Blob): void {
 }
 
 function stem(name: string): string {
-  return name.normalize("NFKD").replace(/[^\w.-]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 80) || "catseye";
+  return name.normalize("NFKD").replace(/[^\w.-]+/g, "-").slice(0, 80).replace(/^\W+|\W+$/g, "") || "catseye";
 }
 
 /** Table as CSV text: label and unit in the first line, values in full, rows in the order of `order`. */

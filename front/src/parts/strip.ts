@@ -4,15 +4,14 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { dateOf, mjdOf, utc } from "../lib/time";
 import type { Num } from "../lib/types";
-import { onScheme } from "./dom";
-import { colour, plainAxis, timeAxis, veil } from "./strip_theme";
+import { colour, onScheme, plainAxis, timeAxis, veil } from "./strip_theme";
 
 export interface StripSeries {
   name: string; label: string; mjd: number[]; value: Num[];
   u?: Num[] | null; low?: Num[] | null; high?: Num[] | null; // u: 1 sigma; low and high: extremes of a bin
 }
 export interface Mark { mjd: number; kind: "alarm" | "warning" | "epoch" | "event"; text: string }
-export interface StripData { label: string; unit: string; series: StripSeries[]; gap: number /* s */; marks: Mark[]; span: [number, number] /* MJD */ }
+export interface StripData { label: string; unit: string; series: StripSeries[]; gap: number /* s without a value that break a line */; marks: Mark[]; span: [number, number] /* MJD */ }
 export interface StripOptions {
   group: string; // strips of one group share the cursor
   label: string;
@@ -28,13 +27,20 @@ export const style = (k: number): { colour: string; dash: number[] | undefined }
   colour: `--c${k % 8}`, dash: DASHES[Math.floor(k / 8) % DASHES.length],
 });
 
+/** Median step between instants, s. */
+function usualStep(instants: number[]): number {
+  const steps = instants.slice(1).map((t, i) => t - (instants[i] ?? t)).sort((a, b) => a - b);
+  return 86400 * (steps[steps.length >> 1] ?? 0);
+}
+
 /** Columns for uPlot on one time axis: value, lower and upper edge of each series; a null breaks the line at a gap. */
 export function aligned(data: StripData): uPlot.AlignedData {
   const tables = data.series.map((s): uPlot.AlignedData => {
+    const gap = Math.max(data.gap, 3 * usualStep(s.mjd)) / 86400; // bins and epochs may stand further apart than the gap
     const t: number[] = [], value: Num[] = [], low: Num[] = [], high: Num[] = [];
     s.mjd.forEach((mjd, i) => {
       const before = s.mjd[i - 1];
-      if (before !== undefined && (mjd - before) * 86400 > data.gap) {
+      if (before !== undefined && mjd - before > gap) {
         t.push(seconds((mjd + before) / 2));
         for (const column of [value, low, high]) column.push(null);
       }

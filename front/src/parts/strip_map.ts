@@ -2,11 +2,10 @@
 // time axis, cursor and zoom as the strips of its group.
 import uPlot from "uplot";
 import { mjdOf } from "../lib/time";
-import { onScheme } from "./dom";
 import type { Strip } from "./strip";
-import { colour, plainAxis, timeAxis, veil } from "./strip_theme";
+import { colour, onScheme, plainAxis, timeAxis, veil } from "./strip_theme";
 
-export interface DropMap { rangers: string[]; bins: number[] /* MJD, edges or starts */; good: number[][]; failed: number[][]; span: [number, number] }
+export interface DropMap { rangers: string[]; bins: number[] /* MJD of the starts, or all edges */; width?: number /* d */; good: number[][]; failed: number[][]; span: [number, number] }
 export interface MapOptions { group: string; label: string; zoom: (span: [number, number] | null) => void; select?: (ranger: string) => void }
 export interface MapStrip { update(data: DropMap): void; canvas: Strip["canvas"]; destroy(): void }
 
@@ -14,8 +13,8 @@ const ROW = 15;
 const seconds = (mjd: number): number => (mjd - 40587) * 86400;
 
 /** End of a bin: the next edge, or as long as the one before. */
-export function end(bins: number[], k: number): number {
-  return bins[k + 1] ?? (bins[k] ?? 0) + ((bins[k] ?? 0) - (bins[k - 1] ?? (bins[k] ?? 0) - 1 / 1440));
+function end({ bins, width }: DropMap, k: number): number {
+  return bins[k + 1] ?? (width !== undefined ? (bins[k] ?? 0) + width : (bins[k] ?? 0) + ((bins[k] ?? 0) - (bins[k - 1] ?? (bins[k] ?? 0) - 1 / 1440)));
 }
 
 function drawCells(plot: uPlot, data: DropMap): void {
@@ -30,7 +29,7 @@ function drawCells(plot: uPlot, data: DropMap): void {
     for (let k = 0; k < columns; k++) {
       const good = data.good[row]?.[k] ?? 0, failed = data.failed[row]?.[k] ?? 0;
       if (good + failed === 0) continue; // nothing was tried: bare
-      const left = plot.valToPos(seconds(data.bins[k] ?? 0), "x", true), right = plot.valToPos(seconds(end(data.bins, k)), "x", true);
+      const left = plot.valToPos(seconds(data.bins[k] ?? 0), "x", true), right = plot.valToPos(seconds(end(data, k)), "x", true);
       if (right < bbox.left || left > bbox.left + bbox.width) continue;
       const share = failed / (good + failed), height = bottom - top;
       ctx.fillStyle = veil("--c5", 0.35);

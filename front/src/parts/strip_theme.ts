@@ -13,6 +13,17 @@ export function veil(name: string, opacity: number): string {
   return /^#[0-9a-f]{6}$/i.test(solid) ? `${solid}${Math.round(255 * Math.max(0, Math.min(1, opacity))).toString(16).padStart(2, "0")}` : solid;
 }
 
+/** Call `handler` whenever the colour scheme changes; the answer ends that. */
+export function onScheme(handler: () => void): () => void {
+  const system = matchMedia("(prefers-color-scheme: dark)"), chosen = new MutationObserver(handler);
+  chosen.observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
+  system.addEventListener("change", handler);
+  return () => {
+    chosen.disconnect();
+    system.removeEventListener("change", handler);
+  };
+}
+
 const two = (n: number): string => String(n).padStart(2, "0");
 
 /** "12:05", with seconds where the steps are shorter than a minute, the date under the first and at midnight. */

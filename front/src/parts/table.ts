@@ -100,15 +100,17 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   const text = (row: number) => (texts[row] ??= columns.map((c) => cell(c, row)).join(" ").toLowerCase());
 
   function header(): void {
-    head.replaceChildren(...columns.map((c) => {
-      const state = sort?.key === c.key ? (sort.down ? "descending" : "ascending") : "none";
+    head.replaceChildren(...columns.map((c, k) => {
+      const down = sort?.key === c.key ? sort.down : null;
       const press = button(c.label, () => {
-        sort = state === "none" ? { key: c.key, down: false } : state === "ascending" ? { key: c.key, down: true } : null;
+        sort = down ? null : { key: c.key, down: down === false };
+        scroll.scrollTop = 0;
         arrange();
-        [...head.querySelectorAll("button")][columns.indexOf(c)]?.focus();
+        head.querySelectorAll("button")[k]!.focus();
       });
-      if (c.unit) press.append(el("small", {}, ` ${c.unit}`));
-      return el(`th.ce-${c.kind}`, { scope: "col", "aria-sort": state }, press);
+      press.append(el("small", {}, ` ${c.unit}`));
+      // Buttons are not repeated on the next sheet of paper, texts are.
+      return el(`th.ce-${c.kind}`, { scope: "col", "aria-sort": down === null ? "none" : down ? "descending" : "ascending" }, ...(all ? press.childNodes : [press]));
     }));
     // Fixed widths where rows come and go, from the longest text of each column.
     widths.replaceChildren();
@@ -116,7 +118,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     if (!windowed()) return;
     let total = 0;
     for (const c of columns) {
-      let longest = c.label.length + (c.unit ? c.unit.length + 1 : 0) + 2;
+      let longest = c.label.length + c.unit.length + 3;
       const step = max(1, floor(count / 2000));
       for (let i = 0; i < count; i += step) longest = max(longest, cell(c, i).length);
       const width = min(longest, 44) + 2.5;

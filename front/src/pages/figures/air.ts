@@ -1,6 +1,7 @@
 // Air along each path of an epoch as charts and tables.
 import type { Chart, Num, Table } from "../../lib/types";
-import type { Air } from "../answers";
+import type { Weather } from "../../lib/state";
+import type { Air, Station } from "../answers";
 import { known, number, text } from "./columns";
 
 export type Quantity = "refractivity" | "temperature";
@@ -36,6 +37,23 @@ export function meanPath(a: Air): { mean: Num; spread: Num } {
   return { mean, spread: own.length > 1 ? Math.sqrt(own.reduce((s, v) => s + (v - mean) ** 2, 0) / (own.length - 1)) : null };
 }
 
+export interface StationRow { name: string; read: Weather | null; offset: Num; u: Num }
+
+/** Stations with their readings and what the adjustment adds to each, °C. */
+export const stationRows = (stations: Station[]): StationRow[] =>
+  stations.map((s) => ({ name: s.name ?? s.station ?? "", read: s.read ?? (s.mjd === undefined ? null : (s as Weather)), offset: s.offset_c ?? null, u: s.u_offset_c ?? null }));
+
+/** Parameters of the profile that have a value with u. */
+export function estimates(a: Air): { name: string; value: Num; u: Num }[] {
+  return Object.entries(a.profile ?? {}).flatMap(([name, v]) => {
+    if (!v || typeof v !== "object" || !("value" in v)) return [];
+    const { value, u } = v as { value: unknown; u?: unknown };
+    return [{ name, value: typeof value === "number" ? value : null, u: typeof u === "number" ? u : null }];
+  });
+}
+
+export const hasTemperatures = (a: Air): boolean => a.paths.temperature_c.some(known);
+
 const PROFILES: [key: string, label: string, unit: string][] = [["temperature_c", "temperature", "°C"], ["refractivity_ppm", "refractivity", "ppm"]];
 
 /** Profile over height, where the answer has one. */
@@ -43,8 +61,8 @@ export function profileChart(a: Air): Chart | null {
   const height = a.profile?.height;
   if (!Array.isArray(height)) return null;
   for (const [key, label, unit] of PROFILES) {
-    const values = a.profile?.[key];
-    if (Array.isArray(values)) return { type: "line", x: { label: "height", unit: "m", values: height }, y: { label, unit, values }, ...(Array.isArray(a.profile?.u) ? { u: a.profile.u } : {}) };
+    const values = a.profile?.[key], u = a.profile?.u;
+    if (Array.isArray(values)) return { type: "line", x: { label: "height", unit: "m", values: height as Num[] }, y: { label, unit, values: values as Num[] }, ...(Array.isArray(u) ? { u: u as Num[] } : {}) };
   }
   return null;
 }

@@ -11,7 +11,7 @@ const ARROWS = 400; // more would hide the network
 export function ranked(c: Comparison): { row: number; length: Num; u: Num }[] {
   const all = lengths(c.dx, c.dy, c.dz);
   const rows = all.map((length, row) => ({ row, length, u: c.covariance ? alongU([c.dx[row] ?? null, c.dy[row] ?? null, c.dz[row] ?? null], c.covariance, row) : null }));
-  const size = (r: { length: Num; u: Num }): number => (known(r.length) && r.u ? r.length / r.u : -1);
+  const size = (r: { row: number; length: Num; u: Num }): number => (known(c.w?.[r.row]) ? Math.abs(c.w?.[r.row] ?? 0) : known(r.length) && r.u ? r.length / r.u : -1);
   return rows.sort((a, b) => size(b) - size(a));
 }
 
@@ -44,7 +44,7 @@ function arrow(from: number[], by: number[]): { x: number[]; y: number[]; z: num
 
 export function comparisonTable(c: Comparison): Table {
   const rows = ranked(c), pick = <T>(column: T[]): T[] => rows.map((r) => column[r.row] as T);
-  const columns = [text("name", "point", pick(c.name)), number("length", "length", "mm", times(rows.map((r) => r.length), 1000), { u: "ulength" }), number("ulength", "u(length)", "mm", times(rows.map((r) => r.u), 1000), { digits: 3 }), number("ratio", "length / u", "", rows.map((r) => (known(r.length) && r.u ? r.length / r.u : null)), { digits: 1 }), text("significant", "significant", rows.map((r) => (c.significant[r.row] ? "moved" : "no")))];
+  const columns = [text("name", "point", pick(c.name)), number("length", "length", "mm", times(rows.map((r) => r.length), 1000), { u: "ulength" }), number("ulength", "u(length)", "mm", times(rows.map((r) => r.u), 1000), { digits: 3 }), c.w ? number("w", "w", "", pick(c.w), { digits: 2 }) : number("ratio", "length / u", "", rows.map((r) => (known(r.length) && r.u ? r.length / r.u : null)), { digits: 1 }), text("significant", "significant", rows.map((r) => (c.significant[r.row] ? "moved" : "no")))];
   for (const axis of ["x", "y", "z"] as const) {
     const variance = c.covariance?.[VARIANCE[axis]];
     columns.push(number(`d${axis}`, `d${axis}`, "mm", times(pick(c[`d${axis}`]), 1000), variance ? { u: `u${axis}` } : {}));

@@ -1,13 +1,21 @@
 // The dish of an epoch: map of deviations, actuators and Zernike coefficients.
 import type { Chart, Table } from "../../lib/types";
 import type { Surface } from "../answers";
-import { number, text, times } from "./columns";
+import { known, number, text, times } from "./columns";
 
 export type Shows = "deviation" | "u" | "actuators";
 
+/** Circle of the aperture. */
+function outline(s: Surface): { x: number[]; y: number[] } | null {
+  const { x, y, radius } = s.aperture ?? {};
+  if (!known(x) || !known(y) || !known(radius)) return null;
+  const turns = Array.from({ length: 91 }, (_, i) => (2 * Math.PI * i) / 90);
+  return { x: turns.map((t) => x + radius * Math.cos(t)), y: turns.map((t) => y + radius * Math.sin(t)) };
+}
+
 export function dishMap(s: Surface, shows: Shows): Chart {
-  const p = s.points, a = s.actuators;
-  const axes = (x: Chart["x"]["values"], y: Chart["x"]["values"]): Pick<Chart, "x" | "y"> => ({ x: { label: "x of the dish", unit: "m", values: x ?? [] }, y: { label: "y of the dish", unit: "m", values: y ?? [] } });
+  const p = s.points, a = s.actuators, rim = outline(s);
+  const axes = (x: Chart["x"]["values"], y: Chart["x"]["values"]): Pick<Chart, "x" | "y" | "outline"> => ({ x: { label: "x of the dish", unit: "m", values: x ?? [] }, y: { label: "y of the dish", unit: "m", values: y ?? [] }, ...(rim ? { outline: [rim] } : {}) });
   if (shows === "actuators" && a) return { type: "map", ...axes(a.x, a.y), name: a.name, value: { label: "actuator", unit: "mm", values: times(a.value, 1000) } };
   if (shows === "u") return { type: "map", ...axes(p.x, p.y), name: p.name, value: { label: "u of the deviation", unit: "mm", values: times(p.u, 1000) } };
   return { type: "map", ...axes(p.x, p.y), name: p.name, value: { label: "deviation along the normal", unit: "mm", values: times(p.deviation, 1000) } };

@@ -26,7 +26,7 @@ export function displacements(moved: Comparison | null, component: Component): M
 }
 
 export function posed(epoch: EpochDetail): Polyline[] {
-  return epoch.posed_structure ?? [];
+  return epoch.structure ?? [];
 }
 
 export function networkScene(epoch: EpochDetail, site: SiteFacts | null, look: Look, moved: Comparison | null): Scene {

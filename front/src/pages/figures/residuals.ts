@@ -11,7 +11,7 @@ export function filtered(r: Residuals, { ranger, target }: Chosen): Residuals {
   if (!ranger && !target) return r;
   const rows = r.shot.map((_, i) => i).filter((i) => (!ranger || r.ranger[i] === ranger) && (!target || r.target[i] === target));
   const pick = <T>(column: T[]): T[] => rows.map((i) => column[i] as T);
-  return { shot: pick(r.shot), ranger: pick(r.ranger), target: pick(r.target), mjd: pick(r.mjd), elevation: pick(r.elevation), residual: pick(r.residual), u: pick(r.u), w: pick(r.w), status: pick(r.status) };
+  return { shot: pick(r.shot), ranger: pick(r.ranger), target: pick(r.target), mjd: pick(r.mjd), elevation: pick(r.elevation), residual: pick(r.residual), u: pick(r.u), w: pick(r.w), status: pick(r.status), ...(r.by ? { by: r.by } : {}) };
 }
 
 export function values(r: Residuals, scale: Scale): { label: string; unit: string; values: Num[] } {

@@ -11,7 +11,7 @@ export class ChosenEpoch {
 
   constructor(key: string) {
     this.key = key;
-    this.list = resource<Epochs>(() => ["/api/epochs", { until: route.at, limit: 200 }], { on: ["epoch"] });
+    this.list = resource<Epochs>(() => ["/api/epochs", { until: route.at, limit: 60 }], { on: ["epoch"] });
   }
 
   all = $derived.by(() => [...(this.list.value?.epochs ?? [])].sort((a, b) => a.number - b.number));
