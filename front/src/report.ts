@@ -15,13 +15,13 @@ async function start(): Promise<void> {
   const host = document.getElementById("catseye-report");
   const source = document.getElementById("catseye-data");
   if (!host || !source) return;
-  host.textContent = "Loading the data of this report …";
+  host.textContent = "Loading …";
   try {
     if (!("DecompressionStream" in window)) throw "it needs a browser from 2023 or later";
     const data = await unpacked(source.textContent ?? "");
     host.textContent = "";
     report(host, data);
-    if (location.hash.length > 1) document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView({ behavior: "instant" });
+    if (location.hash.length > 1) document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
   } catch (error) {
     host.textContent = `The data of this report cannot be shown: ${String(error)}.`;
     host.className = "bad";

@@ -1,5 +1,6 @@
 // The live link: one WebSocket for the whole page. It opens by itself, again after a loss, and says who is silent.
 import { buffers } from "./series.svelte";
+import { silentPart } from "./silence";
 import type { State } from "./state";
 import { mjdNow } from "./time";
 import { token } from "./token.svelte";
@@ -8,8 +9,7 @@ export type Kind = "state" | "shot" | "epoch" | "event" | "posture" | "weather" 
 type Handler = (data: unknown) => void;
 
 const KINDS: Kind[] = ["state", "shot", "epoch", "event", "posture", "weather"];
-const SILENCE_S = 1.75; // with the tick below: greyed within 2 s of the last word
-const TICK_MS = 200;
+const TICK_MS = 150;
 const BACKOFF_S = [0.25, 0.5, 1, 2, 4]; // the last one again and again
 
 class Live {
@@ -37,10 +37,10 @@ class Live {
   /** Which part is silent, or null where all speak. */
   silent = $derived.by((): "service" | "coordinator" | null => {
     if (!this.startedAt) return null;
-    if (this.link === "lost" || this.silence > SILENCE_S) return "service";
-    if (this.state && this.state.source === "live" && (!this.state.connected || this.coordinatorSilence > SILENCE_S))
-      return "coordinator";
-    return null;
+    return silentPart({
+      lost: this.link === "lost", service: this.silence, coordinator: this.coordinatorSilence,
+      connected: this.state?.connected ?? null, watched: this.state?.source === "live",
+    });
   });
   stale = $derived(this.silent !== null || !this.state);
   /** MJD of the last word of the silent part. */

@@ -15,7 +15,7 @@ const order = new Intl.Collator("en", { numeric: true });
 /** Text of a cell: decimals by its column, or by its own uncertainty. */
 export function cellText(column: Column, row: number, u?: Column): string {
   const value = column.values[row];
-  if (column.kind !== "number" || typeof value === "string") return value === null || value === undefined ? "" : String(value);
+  if (column.kind !== "number" || typeof value === "string") return String(value ?? "");
   if (!known(value)) return "unknown";
   if (column.digits !== undefined) return fixed(value, column.digits);
   const s = u?.values[row];
@@ -61,7 +61,7 @@ export function conditions(filter: string, columns: Column[], text: (row: number
 /** Rows in the order of a column; unknown values last either way. */
 export function sorted(rows: number[], column: Column, down: boolean): number[] {
   const sign = down ? -1 : 1;
-  const missing = (v: Num | string | undefined) => v === null || v === undefined || v === "" || Number.isNaN(v);
+  const missing = (v: Num | string | undefined) => (v ?? "") === "" || Number.isNaN(v);
   return [...rows].sort((i, j) => {
     const [a, b] = [column.values[i], column.values[j]];
     if (missing(a) || missing(b)) return Number(missing(a)) - Number(missing(b)) || i - j;
@@ -210,13 +210,9 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
       paint();
     });
   }, { passive: true });
-  let typing = 0;
   input.oninput = () => {
-    clearTimeout(typing);
-    typing = setTimeout(() => {
-      scroll.scrollTop = 0;
-      arrange();
-    }, 120);
+    scroll.scrollTop = 0;
+    arrange();
   };
   body.onclick = (event) => {
     const at = (event.target as HTMLElement).closest("tr")?.dataset.at;
@@ -249,7 +245,6 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     count = columns[0]?.values.length ?? 0;
     grid.classList.toggle("ce-named", named() !== null);
     bar.hidden = options.filter === false;
-    input.hidden = count < 6;
     arrange();
   }
   const resize = new ResizeObserver(() => windowed() && paint());
@@ -271,7 +266,6 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     destroy() {
       stop();
       resize.disconnect();
-      clearTimeout(typing);
       box.remove();
     },
   };
