@@ -115,7 +115,7 @@ function configuration(data: () => StripData, options: StripOptions, width: numb
       points: { show: (_, k) => (k % 3 === 1 ? document.createElement("div") : undefined) as unknown as HTMLElement },
     },
     hooks: {
-      draw: [(plot) => drawMarks(plot, data().marks)],
+      drawAxes: [(plot) => drawMarks(plot, data().marks)], // beneath the lines
       setCursor: [(plot) => options.cursor?.(plot.cursor.left == null || plot.cursor.left < 0 ? null : mjdOf(new Date(plot.posToVal(plot.cursor.left, "x") * 1000)))],
       setSelect: [(plot) => {
         if (plot.select.width < 4) return;

@@ -2,7 +2,7 @@
 import type { SiteFacts } from "../../lib/state";
 import type { Num, Scene, Table } from "../../lib/types";
 import type { Comparison, EpochDetail, Polyline } from "../answers";
-import { known, lengths, number, root, text, times, VARIANCE } from "./columns";
+import { known, lengths, number, root, text, VARIANCE } from "./columns";
 
 export type Colour = "none" | "w" | "displacement";
 export type Component = "x" | "y" | "z" | "length";
@@ -72,11 +72,28 @@ export function networkTable(epoch: EpochDetail, site: SiteFacts | null, moved: 
   const w = worst(epoch), d = displacements(moved, component);
   const columns = [text("name", "point", p.name), text("body", "body", p.name.map((n) => bodies.get(n) ?? ""))];
   for (const axis of ["x", "y", "z"] as const) {
-    columns.push(number(axis, axis, "m", p[axis], { digits: 5 }));
-    if (c) columns.push(number(`u${axis}`, `u(${axis})`, "mm", times(root(c[VARIANCE[axis]]), 1000), { digits: 3 }));
+    columns.push(number(axis, axis, "m", p[axis], c ? { u: `u${axis}` } : { digits: 5 }));
+    if (c) columns.push(number(`u${axis}`, `u(${axis})`, "m", root(c[VARIANCE[axis]]), { digits: 6 }));
   }
   if (p.shots) columns.push(number("shots", "shots", "", p.shots, { digits: 0 }));
   columns.push(number("w", "largest w", "", p.name.map((n) => w.get(n) ?? null), { digits: 2 }));
   if (moved) columns.push(number("d", component === "length" ? "displacement" : `d${component}`, "mm", p.name.map((n) => d.get(n) ?? null), { digits: 3 }));
   return { name: "name", columns };
+}
+
+export function rejectedTable(epoch: EpochDetail): Table {
+  const r = epoch.rejected, of = (key: "ranger" | "target" | "reason"): string[] => r.map((row) => row[key] ?? "unknown");
+  return { name: "shot", columns: [number("shot", "shot", "", r.map((row) => row.shot), { digits: 0 }), text("ranger", "ranger", of("ranger")), text("target", "target", of("target")), text("reason", "reason", of("reason"), "long")] };
+}
+
+/** Zeros of the rangers, parameters of the air and jitter of each body, as the epoch estimated them. */
+export function estimateTable(epoch: EpochDetail): Table | null {
+  const rows: { name: string; value: Num; u: Num; unit: string }[] = [];
+  const mm = (v: Num | undefined): Num => (known(v) ? v * 1000 : null);
+  epoch.zeros?.ranger.forEach((name, i) => rows.push({ name: `zero of ${name}`, value: mm(epoch.zeros?.value[i]), u: mm(epoch.zeros?.u[i]), unit: "mm" }));
+  epoch.air?.name.forEach((name, i) => rows.push({ name: `air: ${name}`, value: epoch.air?.value[i] ?? null, u: epoch.air?.u[i] ?? null, unit: "" }));
+  const jitter = typeof epoch.jitter_mm === "number" ? { all: epoch.jitter_mm } : (epoch.jitter_mm ?? {});
+  for (const [name, value] of Object.entries(jitter)) rows.push({ name: `jitter of ${name}`, value, u: null, unit: "mm" });
+  if (!rows.length) return null;
+  return { name: "name", columns: [text("name", "estimate", rows.map((r) => r.name)), number("value", "value", "", rows.map((r) => r.value), { u: "u" }), number("u", "u", "", rows.map((r) => r.u)), text("unit", "unit", rows.map((r) => r.unit))] };
 }

@@ -28,7 +28,7 @@ export function residualCharts(r: Residuals, scale: Scale): { key: string; title
   };
   const start = r.mjd.find(known) ?? 0;
   const first = r.mjd.reduce((a: number, b) => (known(b) && b < a ? b : a), start);
-  const words = [...new Set(r.status)], shows = words.length > 1 && words.length <= 8;
+  const GOOD = ["used", "ok"], words = [...new Set(r.status)].sort((a, b) => Number(GOOD.includes(b)) - Number(GOOD.includes(a)) || a.localeCompare(b)), shows = words.length > 1 && words.length <= 8;
   const scatter = (x: Chart["x"]): Chart => ({
     type: "scatter", x, y, name, ...(limits ? { limits } : {}),
     ...(shows ? { groups: words, group: r.status.map((s) => words.indexOf(s)) } : {}),

@@ -1,10 +1,16 @@
 // A shot's samples, spectrum and phase per cycle as charts.
 import type { Chart, Num } from "../../lib/types";
 import type { Samples } from "../answers";
-import { known } from "./columns";
+import { plain } from "../../parts/number";
+import { decimal, known } from "./columns";
 
 const FEW = 4096; // marks: more are shown as every n-th, and a window shows all
 const decibel = (volts: Num): Num => (known(volts) && volts > 0 ? 20 * Math.log10(volts) : null);
+
+const DECIMALS: Record<string, number> = { m: 7, rad: 6, ppm: 4 }; // 0.1 um; the last digit of a phase is 0.02 um
+
+/** A step from phase to range at the decimals of its unit. */
+export const stepText = (step: { value: Num; unit: string }): string => (step.unit in DECIMALS ? decimal(step.value, DECIMALS[step.unit] ?? 0, step.unit) : plain(step.value));
 
 /** Samples of a stretch in s; the first hundredth by default, where single cycles are seen. */
 export function samplesChart(s: Samples, from: number, length: number): Chart {
