@@ -49,6 +49,16 @@ export function neighbours(site: SiteFacts, name: string, most = 8): { name: str
     .sort((a, b) => a.distance - b.distance).slice(0, most);
 }
 
+/** Coordinates with u at each epoch. */
+export function pointTable(p: PointHistory): Table {
+  const columns = [number("mjd", "MJD", "d", p.mjd), text("utc", "UTC", p.mjd.map((t) => utc(t, "full")))];
+  for (const axis of AXES) {
+    columns.push(number(axis, axis, "m", p[axis]));
+    if (p.covariance) columns.push(number(`u${axis}`, `u(${axis})`, "m", root(p.covariance[VARIANCE[axis]])));
+  }
+  return { columns };
+}
+
 export function shotsTable(s: Shots): Table {
   return {
     name: "number",
