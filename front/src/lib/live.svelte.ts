@@ -1,5 +1,4 @@
 // The live link: one WebSocket for the whole page. It opens by itself, again after a loss, and says who is silent.
-import { buffers } from "./series.svelte";
 import { silentPart } from "./silence";
 import type { State } from "./state";
 import { mjdNow } from "./time";
@@ -130,10 +129,7 @@ class Live {
     if (message.kind === "state") this.take(message.data as State);
     else if (message.kind === "lag")
       for (const n of Object.values((message.data as { dropped?: Record<string, number> }).dropped ?? {})) this.dropped += n;
-    else {
-      this.heardAt = performance.now();
-      buffers.take(message.kind, message.data);
-    }
+    else this.heardAt = performance.now(); // whatever the coordinator pushes shows that it lives
     for (const handler of this.handlers.get(message.kind) ?? []) handler(message.data);
   }
 

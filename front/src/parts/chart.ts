@@ -117,17 +117,15 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     const yTicks = y.at(max(2, floor(h / 48)));
     const top = legend + 18;
     const left = min(ceil(longest(yTicks)) + 10, w * 0.4);
-    let right = w - 12;
+    // A map's frame has the shape of its area.
+    const right = map ? min(w - 12, left + ((h - 40 - top) * (x1 - x0)) / (y1 - y0)) : w - 12;
     const x = scale(axes.x, x0, x1);
     let xTicks = x.at(8);
     const slot = (right - left) / max(xTicks.length, 1);
     const tilted = !!axes.x.categories && longest(xTicks) + 8 > slot;
     if (!axes.x.categories) xTicks = x.at(max(2, floor((right - left) / (longest(xTicks) + 22))));
     const drop = tilted ? min(longest(xTicks), 110) * 0.72 + 14 : 20;
-    let bottom = h - drop - 20;
-    // A map's frame has the shape of its area.
-    const s = min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
-    if (map) (right = left + s * (x1 - x0)), (bottom = top + s * (y1 - y0));
+    const bottom = map ? top + ((right - left) * (y1 - y0)) / (x1 - x0) : h - drop - 20;
     px = (v) => left + ((v - x0) / (x1 - x0)) * (right - left);
     py = (v) => bottom - ((v - y0) / (y1 - y0)) * (bottom - top);
     inner = { left, right, top, bottom };
@@ -147,10 +145,10 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     for (const t of xTicks) {
       const at = round(px(t.value)) + 0.5;
       if (at < left - 1 || at > right + 1) continue;
-      if (!axes.x.categories || scatter) segment(g, at, top, at, bottom);
-      const half = tilted ? 6.5 : wide(t.text) / 2 + 3;
+      const half = tilted ? 8 : wide(t.text) / 2 + 3;
       if (at - half < free) continue;
       free = at + half;
+      if (!axes.x.categories || scatter) segment(g, at, top, at, bottom);
       g.save();
       g.translate(at, bottom + 12);
       if (tilted) g.rotate(-0.8);

@@ -24,7 +24,7 @@ export function set(element: Element, attributes: Attributes): void {
 }
 
 export function button(text: string, click: () => void): HTMLButtonElement {
-  const element = el("button", { type: "button" }, text);
+  const element = el("button", {}, text);
   element.onclick = click;
   return element;
 }

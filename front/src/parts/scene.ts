@@ -162,7 +162,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     points.group.forEach((k) => sizes[k]!++);
     const rank = (i: number) => (i === selected ? 0 : sizes[groupOf(i)]! + screen[4 * i + 2]! / (12 * extent + screen[4 * i + 2]!));
     const taken = [[0, h - 64, 70, h], [0, 0, 260, 40]];
-    for (const i of points.name.map((_, k) => k).filter((k) => seen(k) && (k === selected || sizes[groupOf(k)]! <= LABELLED)).sort((i, j) => rank(i) - rank(j)).slice(0, 90)) {
+    for (const i of points.name.map((_, k) => k).filter((k) => seen(k) && (k === selected || sizes[groupOf(k)]! <= LABELLED)).sort((i, j) => rank(i) - rank(j)).slice(0, 40)) {
       const name = points.name[i]!;
       const [x, y, away] = places(i);
       const wide = g.measureText(name).width;

@@ -110,7 +110,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
       });
       press.append(el("small", {}, ` ${c.unit}`));
       // Buttons are not repeated on the next sheet of paper, texts are.
-      return el(`th.ce-${c.kind}`, { scope: "col", "aria-sort": down === null ? "none" : down ? "descending" : "ascending" }, ...(all ? press.childNodes : [press]));
+      return el(`th.ce-${c.kind}`, { "aria-sort": down === null ? "none" : down ? "descending" : "ascending" }, ...(all ? press.childNodes : [press]));
     }));
     // Fixed widths where rows come and go, from the longest text of each column.
     widths.replaceChildren();
@@ -245,6 +245,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     count = columns[0]?.values.length ?? 0;
     grid.classList.toggle("ce-named", named() !== null);
     bar.hidden = options.filter === false;
+    input.hidden = count < 9;
     arrange();
   }
   const resize = new ResizeObserver(() => windowed() && paint());
