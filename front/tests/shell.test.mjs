@@ -33,6 +33,8 @@ test("the part nearest to the page is named as silent", () => {
   assert.equal(silentPart({ ...well, connected: false }), "coordinator");
   assert.equal(silentPart({ ...well, coordinator: late }), "coordinator");
   assert.equal(silentPart({ ...well, coordinator: late, watched: false }), null); // a journal
+  assert.equal(silentPart({ ...well, service: 5, watched: false }), null); // that is long to read
+  assert.equal(silentPart({ ...well, service: 11, watched: false }), "service");
   assert.equal(silentPart({ ...well, service: late, connected: null }), "service"); // nothing ever came
 });
 

@@ -9,7 +9,8 @@ type Handler = (data: unknown) => void;
 
 const KINDS: Kind[] = ["state", "shot", "epoch", "event", "posture", "weather"];
 const TICK_MS = 150;
-const BACKOFF_S = [0.25, 0.5, 1, 2, 4]; // the last one again and again
+const DEAF_S = 8; // after so long without a word the socket may be dead without saying so: it is opened anew
+const BACKOFF_S = [0.25, 0.5, 1, 2]; // the last one again and again
 
 class Live {
   link = $state<"connecting" | "open" | "lost">("connecting");
@@ -26,6 +27,7 @@ class Live {
   private socket: WebSocket | null = null;
   private tries = 0;
   private timer = 0;
+  private openedAt = 0;
   private started = false;
   private startedAt = $state(0); // 0: not started, or ended
 
@@ -67,7 +69,7 @@ class Live {
     if (this.started) return;
     this.started = true;
     this.startedAt = performance.now();
-    setInterval(() => (this.tick = performance.now()), TICK_MS);
+    setInterval(() => this.ticked(), TICK_MS);
     const wake = (): void => {
       this.tick = performance.now();
       if (this.link === "lost") this.again(0);
@@ -92,7 +94,15 @@ class Live {
     this.again(0);
   }
 
+  private ticked(): void {
+    this.tick = performance.now();
+    if (this.socket === null || this.tick - Math.max(this.receivedAt, this.openedAt) < 1000 * DEAF_S) return;
+    this.link = "lost";
+    this.again(0);
+  }
+
   private open(): void {
+    this.openedAt = performance.now();
     const scheme = location.protocol === "https:" ? "wss:" : "ws:";
     const socket = new WebSocket(`${scheme}//${location.host}/api/live`);
     this.socket = socket;
@@ -104,7 +114,7 @@ class Live {
       if (this.socket !== socket) return;
       this.refusal = event.reason || null;
       this.link = "lost";
-      this.again(BACKOFF_S[Math.min(this.tries, BACKOFF_S.length - 1)] ?? 4);
+      this.again(BACKOFF_S[Math.min(this.tries, BACKOFF_S.length - 1)] ?? 2);
       this.tries += 1;
     };
   }

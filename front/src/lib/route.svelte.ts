@@ -1,4 +1,5 @@
 // Place in the address: "#/network?epoch=12&point=TR03-R". A link reopens the same view; `at` (MJD) is the replay's time.
+import { token } from "./token.svelte";
 
 function parsed(hash: string): { page: string; query: Record<string, string> } {
   const text = hash.replace(/^#\/?/, "");
@@ -37,6 +38,7 @@ class Route {
   }
 
   read(): void {
+    token.claim();
     const { page, query } = parsed(location.hash);
     this.page = page;
     this.query = query;

@@ -2,6 +2,8 @@
 
 export const SILENCE_S = 1.65; // with the tick of the live link: greyed within 2 s of the last word
 
+const JOURNAL_S = 10; // of a journal, whose state does not grow old and may take long to read
+
 export interface Heard {
   lost: boolean; // the socket is closed
   service: number; // s since the last "state", or since the start before the first
@@ -12,7 +14,8 @@ export interface Heard {
 
 /** The silent part, nearest to the page first; null where all speak. */
 export function silentPart(heard: Heard): "service" | "coordinator" | null {
-  if (heard.lost || heard.service > SILENCE_S) return "service";
-  if (heard.connected === null || !heard.watched) return null;
+  const journal = heard.connected !== null && !heard.watched;
+  if (heard.lost || heard.service > (journal ? JOURNAL_S : SILENCE_S)) return "service";
+  if (heard.connected === null || journal) return null;
   return !heard.connected || heard.coordinator > SILENCE_S ? "coordinator" : null;
 }

@@ -21,7 +21,7 @@ export interface EpochSummary {
   number: number; mjd: number; points: Num; shots: Num; rejected: Num; variance_factor: Num;
   degrees_of_freedom: Num; refractivity_ppm: Num; verdict: unknown; verdict_text?: string | null; azimuth: Num; elevation: Num;
 }
-export interface LastShot { number: number; target: string; status: string; range: Num; u_range: Num; misfit: Num; w?: Num }
+export interface LastShot { number: number; target: string; status: string; range: Num; u_range: Num; misfit: Num }
 export interface RangerState {
   name: string; mjd: Num; state: string; word: string; sign: string; trouble: string | null;
   shots: Num; failures: Num; stream: unknown; last: LastShot | null; next: string | null; next_mjd?: Num;
@@ -35,8 +35,4 @@ export interface State {
   clock: unknown; disk: unknown; journal: unknown; lease: unknown;
   problems: Problem[]; verdict: unknown; verdict_text?: string | null; epoch: EpochSummary | null; posture: Posture | null;
   weather: Weather[]; sun: Sun | null; rangers: RangerState[];
-}
-export interface Shot {
-  number: number; mjd: number; ranger: string; target: string; status: string;
-  range: Num; u_range: Num; misfit: Num; amplitude_v?: Num;
 }

@@ -3,17 +3,6 @@
 
 const STORE = "catseye-token";
 
-function fromAddress(): string | null {
-  const match = /^#\/?\??token=([^&]+)/.exec(location.hash);
-  if (!match?.[1]) return null;
-  history.replaceState(null, "", location.pathname + location.search + "#/");
-  const text = decodeURIComponent(match[1]);
-  try {
-    sessionStorage.setItem(STORE, text);
-  } catch { /* storage is off: the token lasts until the page is closed */ }
-  return text;
-}
-
 function stored(): string | null {
   try {
     return sessionStorage.getItem(STORE);
@@ -23,14 +12,24 @@ function stored(): string | null {
 }
 
 class Token {
-  text = $state<string | null>(fromAddress() ?? stored());
+  text = $state<string | null>(stored());
+
+  /** Take a token out of the address, at once: at the start, and where a link is followed in an open page. */
+  claim(): void {
+    const match = /^#\/?\??token=([^&]+)/.exec(location.hash);
+    if (!match?.[1]) return;
+    history.replaceState(null, "", `${location.pathname}${location.search}#/`);
+    try {
+      this.set(decodeURIComponent(match[1]));
+    } catch { /* not a token: a broken escape */ }
+  }
 
   set(text: string | null): void {
     this.text = text?.trim() || null;
     try {
       if (this.text) sessionStorage.setItem(STORE, this.text);
       else sessionStorage.removeItem(STORE);
-    } catch { /* as above */ }
+    } catch { /* storage is off: the token lasts until the page is closed */ }
   }
 }
 

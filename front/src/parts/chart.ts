@@ -1,7 +1,7 @@
 // Chart on a canvas: marks with uncertainties, hover, keyboard, zoom, downloads, paper.
 import type { Axis, Chart, Column } from "../lib/types";
 import { instant, scale, type Scale } from "./axes";
-import { announce, brief, button, context, el, extent, fill, paper, pixels, segment, set, stroke, surface, type Options, type Palette, type Part } from "./dom";
+import { announce, brief, button, context, el, extent, fill, paper, pixels, segment, stroke, surface, type Options, type Palette, type Part } from "./dom";
 import { csv, png } from "./download";
 import { marksOf, type Mark } from "./marks";
 import { fixed, plain, shown } from "./number";
@@ -379,7 +379,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     measure();
     current = -1;
     stage.classList.toggle("ce-zooms", zooms);
-    set(canvas, { "aria-label": `${label}. Chart (${data.type}): ${axes.y.label} against ${axes.x.label}, ${marks.length} marks. Left and right arrows move among them.` });
+    canvas.ariaLabel = `${label}. Chart (${data.type}): ${axes.y.label} against ${axes.x.label}, ${marks.length} marks. Left and right arrows move among them.`;
     point(-1);
     dirty();
   }

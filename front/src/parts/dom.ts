@@ -14,13 +14,9 @@ export function el<K extends keyof HTMLElementTagNameMap>(
   const [name, ...classes] = tag.split(".");
   const element = document.createElement(name!) as HTMLElementTagNameMap[K];
   if (classes.length) element.className = classes.join(" ");
-  set(element, attributes);
+  for (const key in attributes) element.setAttribute(key, attributes[key] as string);
   for (const child of children) if (child) element.append(child);
   return element;
-}
-
-export function set(element: Element, attributes: Attributes): void {
-  for (const key in attributes) element.setAttribute(key, attributes[key] as string);
 }
 
 export function button(text: string, click: () => void): HTMLButtonElement {

@@ -1,7 +1,7 @@
 // Scene: points with 95 % ellipsoids, beams and structure in three dimensions, in raw WebGL 2.
 import type { Num, Scene } from "../lib/types";
 import { axesOf, fitted, matrixOf, picked, projected, type Camera } from "./camera";
-import { announce, brief, button, channels, context, el, extent as spread, fill, FONT, paper, pixels, segment, set, stroke, surface, ticks, type Options, type Palette, type Part } from "./dom";
+import { announce, brief, button, channels, context, el, extent as spread, fill, FONT, paper, pixels, segment, stroke, surface, ticks, type Options, type Palette, type Part } from "./dom";
 import { png } from "./download";
 import { ellipsoids, type Ellipsoids } from "./ellipsoids";
 import { drawing, type Drawn } from "./gl";
@@ -215,7 +215,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   function composed(ratio: number): HTMLCanvasElement {
     const c = paper(host);
     const picture = el("canvas");
-    const entries = keyList(c);
+    const entries = keyList(c).filter((entry) => !hidden.has(entry[2]!));
     const g = context(picture, WIDE, HIGH + 22 * ceil(entries.length / 3), ratio, c.paper);
     stale = true;
     render(WIDE, HIGH, ratio, c, true);
@@ -250,7 +250,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
 
   function keys(): void {
     withBeams.hidden = !data.beams?.from.length;
-    set(withBeams, { "aria-pressed": beams });
+    withBeams.ariaPressed = `${beams}`;
     legend.replaceChildren(...keyList(self.colours).map(([text, colour, group]) => {
       const swatch = el("i");
       swatch.style.background = colour;
@@ -264,7 +264,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
         dirty();
       });
       press.prepend(swatch);
-      set(press, { "aria-pressed": !hidden.has(group) });
+      press.ariaPressed = `${!hidden.has(group)}`;
       return press;
     }));
   }
@@ -390,7 +390,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     measure();
     mark(name === undefined ? -1 : points.name.indexOf(name));
     hover(-1);
-    set(over, { "aria-label": `${label}. ${points.name.length} points in space; the table has their values. Arrow keys turn, plus and minus zoom, Home shows all, Page Down and Page Up choose a point.` });
+    over.ariaLabel = `${label}. ${points.name.length} points in space; the table has their values. Arrow keys turn, plus and minus zoom, Home shows all, Page Down and Page Up choose a point.`;
     keys();
   }
   begin();

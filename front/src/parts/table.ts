@@ -1,6 +1,6 @@
 // Table that sorts, filters and holds only the rows in sight in the document; all rows print.
 import type { Column, Num, Table } from "../lib/types";
-import { announce, button, el, onPrint, quantile, set, type Options, type Part } from "./dom";
+import { announce, button, el, onPrint, quantile, type Options, type Part } from "./dom";
 import { csv } from "./download";
 import { decimals, fixed, plain, rounded } from "./number";
 import { abs, ceil, clamp, floor, known, log10, max, min } from "./maths";
@@ -136,7 +136,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     tr.dataset.at = String(at);
     if (chosen !== null && named() && nameOf(row) === chosen) {
       tr.className = "ce-chosen";
-      set(tr, { "aria-current": true });
+      tr.ariaCurrent = "true";
     }
     if (at === current) tr.classList.add("ce-current");
     for (const c of columns) {
@@ -177,7 +177,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     const before = rows[current];
     rows = column && sort ? sorted(passed, column, sort.down) : passed;
     current = before === undefined ? -1 : rows.indexOf(before);
-    set(grid, { "aria-rowcount": rows.length + 1 });
+    grid.ariaRowCount = `${rows.length + 1}`;
     size.textContent = rows.length === count ? `${count} rows` : `${rows.length} of ${count} rows`;
     header();
     paint();
