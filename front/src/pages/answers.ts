@@ -1,6 +1,6 @@
 // Shapes of the service's answers that these pages ask for. Arrays are columns; null is an unknown value.
 import type { EpochSummary, Posture, Weather } from "../lib/state";
-import type { Num, Verdict, Word } from "../lib/types";
+import type { Num } from "../lib/types";
 
 /** MJD, or a day as "2026-11-27". */
 export type Day = number | string | null;
@@ -49,13 +49,3 @@ export interface Surface {
   zernike: { n: number; m: number; name: string; value: Num; u: Num }[]; rms: Num; verdict: unknown;
 }
 export interface Events { mjd: number[]; severity: string[]; who: string[]; kind: string[]; text: string[] }
-
-const WORDS: Word[] = ["good", "doubtful", "failed"];
-
-/** Verdict of an answer that may be a record, a word or nothing. */
-export function verdictOf(value: unknown): Verdict | null {
-  if (typeof value === "string") return WORDS.includes(value as Word) ? { word: value as Word, why: "" } : null;
-  if (!value || typeof value !== "object") return null;
-  const { word, why } = value as { word?: unknown; why?: unknown };
-  return WORDS.includes(word as Word) ? { word: word as Word, why: typeof why === "string" ? why : "" } : null;
-}

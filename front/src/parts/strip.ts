@@ -158,7 +158,9 @@ export function strip(host: HTMLElement, data: StripData, options: StripOptions)
   host.addEventListener("keydown", keyed);
   return {
     update(next) {
+      const moved = next.series === current.series; // the axis or the marks alone: the lines need not be joined again
       current = next;
+      if (moved) return void plot.setScale("x", { min: seconds(next.span[0]), max: seconds(next.span[1]) });
       if (key(next) === shape) return void plot.setData(aligned(next), true);
       shape = key(next);
       plot.destroy();

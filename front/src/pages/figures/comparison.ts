@@ -53,10 +53,12 @@ export function comparisonTable(c: Comparison): Table {
   return { name: "name", columns };
 }
 
-/** Power of ten that makes the largest significant displacement some twentieth of the scene. */
+/** Factor of 1, 2 or 5 times a power of ten that makes the largest significant displacement some twentieth of the scene. */
 export function usualScale(c: Comparison, epoch: EpochDetail): number {
   const most = (values: Num[]): number => values.reduce((a: number, v) => (known(v) && Math.abs(v) > a ? Math.abs(v) : a), 0);
   const moved = most(lengths(c.dx, c.dy, c.dz).filter((_, i) => c.significant[i])), size = most(epoch.points.x);
-  return moved > 0 && size > 0 ? 10 ** Math.floor(Math.log10((0.1 * size) / moved)) : 1000;
+  if (moved <= 0 || size <= 0) return 1000;
+  const wanted = (0.1 * size) / moved, power = 10 ** Math.floor(Math.log10(wanted));
+  return power * (wanted / power >= 5 ? 5 : wanted / power >= 2 ? 2 : 1);
 }
 

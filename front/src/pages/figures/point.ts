@@ -3,12 +3,12 @@ import type { SiteFacts } from "../../lib/state";
 import { utc } from "../../lib/time";
 import type { Num, Table } from "../../lib/types";
 import { eigen } from "../../parts/eigen";
+import { RADIUS } from "../../parts/ellipsoids";
 import type { StripSeries } from "../../parts/strip";
 import type { PointHistory, Shots } from "../answers";
 import { known, median, number, root, text, times, VARIANCE } from "./columns";
 
 export const AXES = ["x", "y", "z"] as const;
-const FACTOR_95 = 2.7955; // square root of the 95 % quantile of chi-squared with 3 degrees of freedom
 
 /** Index of the last instant at which the point had coordinates, or -1. */
 export const lastRow = (p: PointHistory): number => p.x.reduce((last: number, x, i) => (known(x) ? i : last), -1);
@@ -35,7 +35,7 @@ export function ellipsoid(p: PointHistory, row: number): SemiAxis[] | null {
   if (![xx, xy, xz, yy, yz, zz].every(known)) return null;
   const { values, vectors } = eigen([xx, xy, xz, yy, yz, zz] as number[]);
   return values
-    .map((value, k) => ({ u: Math.sqrt(Math.max(0, value)), wide: FACTOR_95 * Math.sqrt(Math.max(0, value)), direction: vectors[k] ?? [] }))
+    .map((value, k) => ({ u: Math.sqrt(Math.max(0, value)), wide: RADIUS * Math.sqrt(Math.max(0, value)), direction: vectors[k] ?? [] }))
     .sort((a, b) => b.u - a.u);
 }
 
@@ -47,6 +47,16 @@ export function neighbours(site: SiteFacts, name: string, most = 8): { name: str
   return t.name
     .flatMap((n, i) => { const p = at(i); return i === own || !p ? [] : [{ name: n, body: t.body[i] ?? "", distance: Math.hypot(...p.map((v, k) => v - (from[k] ?? 0))) }]; })
     .sort((a, b) => a.distance - b.distance).slice(0, most);
+}
+
+/** Coordinates with u at each epoch. */
+export function pointTable(p: PointHistory): Table {
+  const columns = [number("mjd", "MJD", "d", p.mjd), text("utc", "UTC", p.mjd.map((t) => utc(t, "full")))];
+  for (const axis of AXES) {
+    columns.push(number(axis, axis, "m", p[axis]));
+    if (p.covariance) columns.push(number(`u${axis}`, `u(${axis})`, "m", root(p.covariance[VARIANCE[axis]])));
+  }
+  return { columns };
 }
 
 export function shotsTable(s: Shots): Table {

@@ -8,6 +8,7 @@ import { appended } from "./strips";
 
 const MOST = 2000; // values a series, as many as a strip has pixels
 const PAUSE_S = 2;
+const OVERLAP_S = 180; // epochs are solved after the instant they stand for
 const WHOLE_EVERY = 30; // rounds: the last bins of a binned series do not stay fine for ever
 
 /** The last days before now or before the replay's instant, or a fixed span. */
@@ -33,14 +34,14 @@ export class FollowedSeries {
   private follow(names: string[], stretch: Stretch): (() => void) | void {
     if (!names.length) return void (this.value = null);
     const stop = new AbortController(), grows = "days" in stretch && route.at === null;
-    let timer = 0, round = 0;
+    let timer = 0, round = 0, reached = 0;
     const load = async (whole: boolean): Promise<void> => {
-      const [since, until] = spanOf(stretch), held = this.value?.names ?? [];
-      const from = whole ? since : Math.max(since, Math.min(...held.map((s) => s.mjd.at(-1) ?? since)));
+      const [since, until] = spanOf(stretch), from = whole ? since : Math.max(since, reached - OVERLAP_S / 86400);
       try {
         const answer = await get<Series>("/api/series", { names: names.join(","), since: from, until: grows ? null : until, most: MOST }, stop.signal);
         this.value = whole || !this.value ? answer : appended(this.value, answer, since);
         this.error = null;
+        reached = until;
       } catch (error) {
         if (stop.signal.aborted) return;
         this.error = error instanceof Error ? error.message : String(error);
