@@ -1,0 +1,110 @@
+// Commands to the site: what each does, the dialog that asks, and what came of it, in the site's words.
+import { ApiError, post } from "./api";
+import { settings } from "./settings.svelte";
+import { mjdNow } from "./time";
+
+export type Name = "MODE" | "DROP" | "TAKE" | "STREAM" | "SET" | "PREPARE" | "START" | "CLOCK";
+export interface Field { key: string; label: string; from: "modes" | "rangers" | "targets" | "parameters" | "text"; optional?: boolean }
+export interface Kind {
+  name: Name; title: string; about: string; fields: Field[];
+  parameters: (values: Record<string, string>) => string[];
+  effect: (values: Record<string, string>) => string;
+}
+export interface Issued {
+  id: number; line: string; who: string; mjd: number;
+  outcome: "in flight" | "done" | "refused"; text: string; status: number;
+}
+
+const MODES: Record<string, string> = {
+  active: "The site plans rounds and fires: lasers are lit.",
+  passive: "The site fires nothing; it listens to what another client measures.",
+  hold: "The site stays connected and fires nothing. Shots under way are finished.",
+};
+const ranger: Field = { key: "ranger", label: "Ranger", from: "rangers" };
+
+export const kinds: Kind[] = [
+  {
+    name: "MODE", title: "Change the mode", about: "Active plans and fires, passive listens to another client, hold fires nothing.", fields: [{ key: "mode", label: "Mode", from: "modes" }],
+    parameters: (v) => [v.mode ?? ""], effect: (v) => MODES[v.mode ?? ""] ?? "Sets the coordinator's mode.",
+  },
+  {
+    name: "DROP", title: "Leave a ranger out", about: "It stays connected and measures no more, until it is taken again.", fields: [ranger], parameters: (v) => [v.ranger ?? ""],
+    effect: (v) => `${v.ranger || "The ranger"} stays connected and measures no more, until it is taken again.`,
+  },
+  {
+    name: "TAKE", title: "Use a ranger again", about: "It is made ready, its laser is lit, and it measures again.", fields: [ranger], parameters: (v) => [v.ranger ?? ""],
+    effect: (v) => `${v.ranger || "The ranger"} is made ready, its laser is lit, and it measures again.`,
+  },
+  {
+    name: "STREAM", title: "Stream one target", about: "A ranger measures one target again and again, or ends that.", fields: [ranger, { key: "target", label: "Target (empty: end the stream)", from: "targets", optional: true }],
+    parameters: (v) => (v.target ? [v.ranger ?? "", v.target] : [v.ranger ?? ""]),
+    effect: (v) => v.target ? `${v.ranger || "The ranger"} measures ${v.target} again and again, and nothing else.` : `${v.ranger || "The ranger"} ends its stream and goes back to the plan.`,
+  },
+  {
+    name: "SET", title: "Set a parameter", about: "The value is checked and waits for PREPARE and START.", fields: [{ key: "name", label: "Parameter", from: "parameters" }, { key: "value", label: "Value", from: "text" }],
+    parameters: (v) => [v.name ?? "", v.value ?? ""],
+    effect: (v) => `The value of ${v.name || "the parameter"} is checked and waits. Nothing changes before START.`,
+  },
+  { name: "PREPARE", title: "Check waiting values", about: "All values that wait are checked together.", fields: [], parameters: () => [], effect: () => "Checks all values that wait, together. Nothing changes before START." },
+  { name: "START", title: "Activate prepared values", about: "All prepared values become active at once.", fields: [], parameters: () => [], effect: () => "All prepared values become active at once." },
+  {
+    name: "CLOCK", title: "Accept the machine's clock", about: "The count of UTC takes this machine's clock over; where clocks disagreed, firing goes on.", fields: [], parameters: () => ["ACCEPT"],
+    effect: () => "The coordinator's count of UTC takes the machine's clock over, and firing may go on. Do this only where that clock is known to be right.",
+  },
+];
+
+/** Why a command failed, with what to do. */
+export function reason(error: unknown): { status: number; text: string } {
+  if (!(error instanceof ApiError)) return { status: 0, text: String(error) };
+  const lead: Record<number, string> = {
+    0: "Not known to have arrived", 401: "No valid token (see Settings)", 403: "Not allowed from here",
+    409: "The site refused", 422: "Not understood", 503: "The site is not connected",
+  };
+  return { status: error.status, text: `${lead[error.status] ?? `Status ${error.status}`}: ${error.message}` };
+}
+
+class Commands {
+  /** The command that the dialog asks about, with values filled in. */
+  asked = $state.raw<{ kind: Kind; values: Record<string, string> } | null>(null);
+  issued = $state<Issued[]>([]);
+  flying = $derived(this.issued.filter((each) => each.outcome === "in flight").length);
+  private count = 0;
+
+  ask(name: Name, values: Record<string, string> = {}): void {
+    const kind = kinds.find((each) => each.name === name);
+    if (kind) this.asked = { kind, values };
+  }
+
+  async send(kind: Kind, values: Record<string, string>): Promise<Issued> {
+    const parameters = kind.parameters(values);
+    const who = settings.who;
+    return this.run([kind.name, ...parameters].join(" "), who, async () => {
+      const answer = await post<{ values: unknown }>("/api/commands", { command: kind.name, parameters, who });
+      return said(answer.values);
+    });
+  }
+
+  /** Run any act of a person against the service and keep what came of it. */
+  async run(line: string, who: string, act: () => Promise<string>): Promise<Issued> {
+    this.count += 1;
+    this.issued = [{ id: this.count, line, who, mjd: mjdNow(), outcome: "in flight", text: "", status: 0 } as Issued, ...this.issued].slice(0, 100);
+    const entry = this.issued[0] as Issued; // the reactive one
+    try {
+      entry.text = await act();
+      entry.outcome = "done";
+    } catch (error) {
+      const { status, text } = reason(error);
+      entry.status = status;
+      entry.text = text;
+      entry.outcome = "refused";
+    }
+    return entry;
+  }
+}
+
+function said(values: unknown): string {
+  if (Array.isArray(values)) return values.map((each) => said(each)).join(", ");
+  return values == null ? "" : String(values);
+}
+
+export const commands = new Commands();
