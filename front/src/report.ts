@@ -1,1 +1,33 @@
-export {};
+// A report's script: unpacks the data that the file holds and shows them. Nothing is loaded.
+import type { Report } from "./lib/types";
+import { report } from "./parts/report";
+import "./report.css";
+
+async function unpacked(text: string): Promise<Report> {
+  const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const data = (await new Response(stream).json()) as Report;
+  if (data.format !== "catseye-report-1") throw new Error(`format ${String(data.format)} is unknown`);
+  return data;
+}
+
+async function start(): Promise<void> {
+  const host = document.getElementById("catseye-report");
+  const source = document.getElementById("catseye-data");
+  if (!host || !source) return;
+  host.textContent = "Loading the data of this report …";
+  try {
+    if (!("DecompressionStream" in window)) throw new Error("this browser is too old; one from 2023 or later is needed");
+    const data = await unpacked(source.textContent ?? "");
+    host.textContent = "";
+    report(host, data);
+    if (location.hash.length > 1) document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
+  } catch (error) {
+    host.textContent = `The data of this report cannot be shown: ${error instanceof Error ? error.message : String(error)}.`;
+    host.className = "bad";
+    host.setAttribute("role", "alert");
+  }
+}
+
+if (document.readyState === "loading") addEventListener("DOMContentLoaded", () => void start());
+else void start();
