@@ -3,10 +3,20 @@ import type { Report } from "./lib/types";
 import { report } from "./parts/report";
 import "./report.css";
 
+/** Report with its repeated lists, which its data hold once, in their places. */
+function expanded(part: unknown, lists: unknown[]): unknown {
+  if (part === null || typeof part !== "object") return part;
+  if (Array.isArray(part)) return part.length && typeof part[0] === "object" ? part.map((item) => expanded(item, lists)) : part;
+  const keys = Object.keys(part);
+  if (keys.length === 1 && keys[0] === "shared") return lists[(part as { shared: number }).shared];
+  return Object.fromEntries(Object.entries(part).map(([key, item]) => [key, expanded(item, lists)]));
+}
+
 async function unpacked(text: string): Promise<Report> {
   const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const data = (await new Response(stream).json()) as Report;
+  const { shared = [], ...packed } = (await new Response(stream).json()) as Report & { shared?: unknown[] };
+  const data = expanded(packed, shared) as Report;
   if (data.format !== "catseye-report-1") throw new Error(`format ${String(data.format)} is unknown`);
   return data;
 }
