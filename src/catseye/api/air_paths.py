@@ -215,7 +215,7 @@ class RefractometerResult(Result):
 
     def figures(self) -> "dict[str, Figure]":
         """The night with its residuals, and phase against weather."""
-        from catseye.gateways.air.refractometer_report import refractometer_figures
+        from catseye.gateways.air.refractometer_figures import refractometer_figures
 
         return refractometer_figures(self.calibration)
 

@@ -400,7 +400,7 @@ class ComparisonResult(Result):
 
     def figures(self) -> "dict[str, Figure]":
         """Plan and elevation with displacements and their ellipses."""
-        from catseye.gateways.network.comparison_report import comparison_figures
+        from catseye.gateways.network.comparison_figures import comparison_figures
 
         return {name: drawn.figure for name, drawn in comparison_figures(self.compared).items()}
 

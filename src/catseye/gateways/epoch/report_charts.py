@@ -30,7 +30,8 @@ def network_scene(reduction: Reduction) -> Scene:
         group=[groups.index(kinds[row]) for row in rows],
         covariance=coordinates.joint.blocks[rows],
         info=[
-            f"{kinds[row]}, {coordinates.shots[row]:.0f} shots, u {' / '.join(f'{v:.3f}' for v in u[row])} mm" for row in rows
+            f"{kinds[row]}, {coordinates.shots[row]:.0f} shots, u {' / '.join(f'{v:.3f}' for v in u[row])} mm"
+            for row in rows
         ],
         beams=Beams(
             start=[index[ranges.ranger[k]] for k in used],
@@ -138,7 +139,9 @@ def zeros_chart(reduction: Reduction) -> Chart:
     zeros = reduction.coordinates.zeros
     names = sorted(zeros)
     value, u = (np.array([zeros[name][part] for name in names]) * 1e6 for part in (0, 1))
-    return Chart("scatter", categories("ranger", names), Axis("correction to the range", "µm", value, digits=2), u=u, names=names)
+    return Chart(
+        "scatter", categories("ranger", names), Axis("correction to the range", "µm", value, digits=2), u=u, names=names
+    )
 
 
 def refractivity_chart(reduction: Reduction) -> Chart | None:
@@ -165,7 +168,7 @@ def weather_charts(reduction: Reduction) -> dict[str, Chart]:
     """Temperature, pressure and humidity of the stations over time."""
     weather, site = reduction.campaign.weather, reduction.campaign.site
     order = {device.name: k for k, device in enumerate(site.weather_station)}
-    rows = np.lexsort((weather.mjd_utc, [order[name] for name in weather.station]))
+    rows = np.lexsort((weather.mjd_utc, np.array([order[name] for name in weather.station])))
     minutes = Axis(AFTER, "min", _minutes(reduction, weather.mjd_utc[rows]), digits=2)
     columns = (
         ("temperature", "°C", weather.temperature_c),

@@ -22,7 +22,9 @@ ROUNDED = (
     "digits. The CSV and JSON files beside it have all digits."
 )
 SHORT = 50  # values of a column; shorter ones are repeated
-WITHOUT = "The tables, charts and drawings of this report need a browser with scripts; they load nothing from elsewhere."
+WITHOUT = (
+    "The tables, charts and drawings of this report need a browser with scripts; they load nothing from elsewhere."
+)
 
 
 def report_page(report: Report) -> str:

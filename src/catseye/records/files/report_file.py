@@ -8,7 +8,7 @@ import binascii
 import json
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +42,9 @@ def read_report(path: Path) -> dict[str, Any]:
     report = _document(_unpacked(packed, str(page)), str(page))
     if not isinstance(report, dict) or report.get("format") != FORMAT:
         found = report.get("format") if isinstance(report, dict) else report
-        raise refusal(str(page), f"format = {shown(found)} (expected {FORMAT}: use the catseye that wrote it, or run it again)")
+        raise refusal(
+            str(page), f"format = {shown(found)} (expected {FORMAT}: use the catseye that wrote it, or run it again)"
+        )
     try:
         report = _expanded(report)
         _require_report(report)
@@ -124,7 +126,9 @@ def _expanded(report: Mapping[str, Any]) -> dict[str, Any]:
             return list(lists[place])
         if isinstance(part, dict):
             return {key: expanded(item) for key, item in part.items()}
-        return [expanded(item) for item in part] if isinstance(part, list) and part and isinstance(part[0], dict) else part
+        return (
+            [expanded(item) for item in part] if isinstance(part, list) and part and isinstance(part[0], dict) else part
+        )
 
     return {key: expanded(item) for key, item in report.items() if key != SHARED}
 
