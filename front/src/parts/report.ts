@@ -5,6 +5,7 @@ import { el, onPrint } from "./dom";
 import { scene } from "./scene";
 import { table } from "./table";
 import "./parts.css";
+import "./result.css";
 
 export interface ReportOptions { embedded?: boolean /* in the dashboard: with title, verdict, cards and passages; no addresses */ }
 

@@ -1,6 +1,6 @@
 // Table that sorts, filters and holds only the rows in sight in the document; all rows print.
 import type { Column, Num, Table } from "../lib/types";
-import { announce, button, el, onPrint, type Options, type Part } from "./dom";
+import { announce, button, el, onPrint, quantile, type Options, type Part } from "./dom";
 import { csv } from "./download";
 import { decimals, fixed, plain, rounded } from "./number";
 import "./parts.css";
@@ -20,7 +20,23 @@ export function cellText(column: Column, row: number, u?: Column): string {
   if (!known(value)) return "unknown";
   if (column.digits !== undefined) return fixed(value, column.digits);
   const s = u?.values[row];
-  return known(s) && s > 0 ? rounded(value, decimals(s)) : plain(value);
+  return known(s) && s > 0 ? rounded(value, decimals(s)) : value && Math.abs(value) < 1e-9 ? plain(value) : fixed(value, common(column));
+}
+
+const places = new WeakMap<Column, number>();
+
+/** Decimals for all values of a column that states none: four significant digits of nearly the largest, no needless zeros. */
+function common(column: Column): number {
+  let digits = places.get(column);
+  if (digits === undefined) {
+    const values = column.values.filter(known);
+    const size = quantile(values.map(Math.abs), 0.9);
+    const most = size > 0 ? Math.min(Math.max(3 - Math.floor(Math.log10(size)), 0), 10) : 0;
+    digits = 0;
+    while (digits < most && !values.every((v) => Math.abs(v - Number(v.toFixed(digits))) < 1e-12 * Math.abs(v))) digits++;
+    places.set(column, digits);
+  }
+  return digits;
 }
 
 type Test = (row: number) => boolean;
@@ -78,7 +94,9 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   const named = () => data.columns.find((c) => c.key === data.name) ?? null;
   const nameOf = (row: number) => String(named()?.values[row] ?? "");
   const windowed = () => !all && count > WINDOWED;
-  const cell = (c: Column, row: number) => cellText(c, row, c.u ? data.columns.find((d) => d.key === c.u) : undefined);
+  // A column of uncertainties is rounded by itself.
+  const ruler = (c: Column) => data.columns.find((d) => d.key === c.u) ?? (data.columns.some((d) => d.u === c.key) ? c : undefined);
+  const cell = (c: Column, row: number) => cellText(c, row, ruler(c));
   const text = (row: number) => (texts[row] ??= data.columns.map((c) => cell(c, row)).join(" ").toLowerCase());
 
   function header(): void {
@@ -142,7 +160,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
       for (let from = 0; from < rows.length; from += PRINTED) body.append(...rows.slice(from, from + PRINTED).map((_, i) => line(from + i)));
       return;
     }
-    const seen = Math.ceil((scroll.clientHeight || 400) / HEIGHT);
+    const seen = Math.ceil(Math.max(scroll.clientHeight, 480) / HEIGHT);
     const from = Math.min(Math.max(0, Math.floor(scroll.scrollTop / HEIGHT) - 6), Math.max(0, rows.length - seen));
     const to = Math.min(rows.length, from + seen + 12);
     const lines = [];
@@ -232,6 +250,8 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     input.hidden = count < 6;
     arrange();
   }
+  const resize = new ResizeObserver(() => windowed() && paint());
+  resize.observe(scroll);
   if (options.rows) scroll.style.maxHeight = `${(options.rows + 1) * HEIGHT + 10}px`;
   host.append(box);
   update(data);
@@ -248,6 +268,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     },
     destroy() {
       stop();
+      resize.disconnect();
       clearTimeout(typing);
       box.remove();
     },
