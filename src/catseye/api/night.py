@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import Report
     from catseye.records.night.campaign import Campaign
     from catseye.reduction.budget.explanation import Explanation
     from catseye.reduction.epoch.epoch import Reduction
@@ -130,6 +131,12 @@ class NightResult(Result):
         from catseye.gateways.epoch.figures import figures
 
         return figures(self.reduction)
+
+    def _report(self, when: "datetime") -> "Report":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.epoch.report import reduction_report
+
+        return reduction_report(self.reduction.held(), when)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye reduce --out`."""
@@ -242,11 +249,16 @@ class ExplanationResult(Result):
         """The page that `--page` writes, as explanation.html, with the table and the JSON."""
         self.write_files(directory, progress, {"explanation.html": self._page})
 
-    def _page(self, now: "datetime") -> str:
+    def _report(self, when: "datetime") -> "Report":
+        """Report of the page that `--page` writes, made at a time, UTC."""
         from catseye.gateways.epoch.explain_page import explanation_report
+
+        return explanation_report(self.explanation, self.campaign, when)
+
+    def _page(self, now: "datetime") -> str:
         from catseye.gateways.writers.report_page import report_page
 
-        return report_page(explanation_report(self.explanation, self.campaign, now))
+        return report_page(self._report(now))
 
     def save_page(self, path: "str | os.PathLike[str]") -> Path:
         """Write the page of the shot, whole or not at all: a new HTML file, or an earlier page of a shot."""

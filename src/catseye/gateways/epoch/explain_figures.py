@@ -3,12 +3,21 @@
 import numpy as np
 
 from catseye.gateways.epoch.explain import MICROMETRE, SMALLEST_SHARE, metres, micrometres
-from catseye.gateways.epoch.explain_page import GROUPS, group_of
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, mpl, styled
 from catseye.reduction.budget.explanation import Explanation
 
 WIDE = 4.5  # standard uncertainties on either side in the histogram
-COLOURS = dict(zip(GROUPS, (SERIES[0], SERIES[1], SERIES[3], SERIES[2], SERIES[4]), strict=True))
+GROUPS = (
+    ("the samples", SERIES[0], ("noise", "amplitude", "steps")),
+    ("the electronics", SERIES[1], ("reference", "references", "walk")),
+    ("the head", SERIES[3], ("leakage", "d0", "axes", "coupling", "cyclic", "frequency")),
+    (
+        "the air",
+        SERIES[2],
+        ("thermometer", "profile", "sound", "pressure", "humidity", "formula", "unread", "fluctuation"),
+    ),
+    ("the glass", SERIES[4], ("height", "ratio", "r1", "r2", "incidence", "across")),
+)
 
 
 def figures(explanation: Explanation) -> dict[str, Figure]:
@@ -21,7 +30,8 @@ def figures(explanation: Explanation) -> dict[str, Figure]:
 
 
 def _colour(key: str) -> str:
-    return COLOURS[group_of(key)]
+    first = key.partition(" ")[0]
+    return next(colour for _, colour, keys in GROUPS if first in keys)
 
 
 def _contributions(explanation: Explanation) -> Figure:
@@ -50,7 +60,7 @@ def _contributions(explanation: Explanation) -> Figure:
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("contribution to the standard uncertainty, µm (right: share of variance)")
     used = {_colour(explanation.items[k].key) for k in order}
-    handles = [mpl.patches.Patch(color=colour, label=name) for name, colour in COLOURS.items() if colour in used]
+    handles = [mpl.patches.Patch(color=colour, label=name) for name, colour, _ in GROUPS if colour in used]
     ax.legend(handles=handles, loc="lower right")
     return figure
 

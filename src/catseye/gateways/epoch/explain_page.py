@@ -36,19 +36,6 @@ from catseye.reduction.budget.scene import Assumptions
 
 MARK = "<title>catseye: shot "  # identifies a page of catseye
 MOST_DRAWS = 20_000  # in the histogram
-GROUPS = {  # group of inputs -> first words of their keys
-    "the samples": ("noise", "amplitude", "steps"),
-    "the electronics": ("reference", "references", "walk"),
-    "the head": ("leakage", "d0", "axes", "coupling", "cyclic", "frequency"),
-    "the air": ("thermometer", "profile", "sound", "pressure", "humidity", "formula", "unread", "fluctuation"),
-    "the glass": ("height", "ratio", "r1", "r2", "incidence", "across"),
-}
-
-
-def group_of(key: str) -> str:
-    """Group of an input, by its key."""
-    first = key.partition(" ")[0]
-    return next(group for group, keys in GROUPS.items() if first in keys)
 
 
 def explanation_report(explanation: Explanation, campaign: Campaign, made_at: datetime) -> Report:
@@ -103,7 +90,6 @@ def _budget(explanation: Explanation) -> Section:
     share, contribution = 100.0 * budget.share[order], budget.contribution[order] / MICROMETRE
     drawn = [k for k in range(len(order)) if abs(share[k]) >= 100.0 * SMALLEST_SHARE]
     names = ["together", *(items[k].given.name for k in drawn)]
-    used = [group for group in GROUPS if group in {group_of(items[k].key) for k in drawn}]
     chart = Chart(
         "bars",
         Axis("input", "", list(range(len(names))), names, digits=0),
@@ -114,8 +100,6 @@ def _budget(explanation: Explanation) -> Section:
             digits=3,
         ),
         names=names,
-        group=[0, *(1 + used.index(group_of(items[k].key)) for k in drawn)],
-        groups=("together", *used),
     )
     table = Table(
         (

@@ -400,8 +400,7 @@ def _shots(reduction: Reduction) -> Section:
         "shot",
     )
     lead = "Shots with a phase, by ranger. Every correction to each range is in ranges.csv."
-    title = f"{len(ranges.shot)} ranges"
-    return Section("shots", "Ranges", [Text(lead), TableBlock("shots", table, folded=title)])
+    return Section("shots", "Ranges", [Text(lead), TableBlock("shots", table, folded="Ranges")])
 
 
 def _provenance(reduction: Reduction, when: datetime) -> Section:

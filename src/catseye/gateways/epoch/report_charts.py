@@ -10,7 +10,8 @@ from catseye.reduction.epoch.surface import DishFit
 
 BEYOND = 1.35  # times the largest residual of a used shot: limit of the rejected shots in a chart
 RIM = 73  # points of the aperture's outline
-AFTER = "minutes after the first shot"
+GROUPS = ("ground rangers", "feed-arm rangers", "rejected")  # of residuals
+AFTER = "time after the first shot"
 
 
 def network_scene(reduction: Reduction) -> Scene:
@@ -95,9 +96,12 @@ def residual_charts(reduction: Reduction) -> dict[str, tuple[Chart, str]]:
         "w-by-elevation": (by(elevation), "The same by the path's elevation at the ranger."),
         "w-histogram": (
             Chart("histogram", standardised, limits=limits),
-            "Histogram of w, and the normal distribution that the claimed uncertainties predict.",
+            "Histogram of w: a normal distribution of width 1 where the claimed uncertainties hold.",
         ),
-        "w-normal": (Chart("normal", standardised, names=names), "w against the quantiles of the normal distribution."),
+        "w-normal": (
+            Chart("normal", standardised, names=names),
+            "w against the quantiles of that normal distribution.",
+        ),
     }
 
 
@@ -118,7 +122,7 @@ def _in_time(reduction: Reduction) -> tuple[Chart, str]:
         Axis("observed minus adjusted", "mm", residual[rows], digits=4),
         names=shots.shot[ranges.shot[rows]].tolist(),
         group=group,
-        groups=("ground rangers", "feed-arm rangers", "rejected"),
+        groups=GROUPS[: int(group.max()) + 1],
     )
     return chart, f"Residuals of the ranges in the order of time.{more}"
 

@@ -67,7 +67,7 @@ def _covariance(adjusted: AdjustedNetwork) -> np.ndarray:
 
 def _roles(adjusted: AdjustedNetwork, rows: np.ndarray) -> tuple[list[str], np.ndarray]:
     """Groups of the points, station or target, held or not, and each point's group."""
-    held = ~adjusted.network.points.free.any(axis=1)
+    held = np.asarray(~adjusted.network.points.free.any(axis=1))
     names = ("target", "station", "held point", "held station")
     kind = adjusted.stations[rows].astype(int) + 2 * held[rows]
     used = np.unique(kind)
@@ -144,9 +144,11 @@ def residual_charts(adjusted: AdjustedNetwork) -> list[ChartBlock]:
         ChartBlock(
             "w-histogram",
             Chart("histogram", statistic, limits=limits),
-            "Their histogram, and the normal distribution that the claimed uncertainties predict.",
+            "Their histogram: a normal distribution of width 1 where the claimed uncertainties hold.",
         ),
-        ChartBlock("w-normal", Chart("normal", statistic, names=names), "Against the normal distribution."),
+        ChartBlock(
+            "w-normal", Chart("normal", statistic, names=names), "Against the quantiles of that normal distribution."
+        ),
     ]
 
 

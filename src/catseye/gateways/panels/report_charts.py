@@ -65,7 +65,9 @@ def surface_charts(heights: "PanelHeights") -> list[ChartBlock]:
     panels = np.array(heights.layout.panels)
     x, y = _plane(middle[known])
     departure = Coloured("departure from the best fit, towards the focus", "µm", mean[known] * 1e6, 2)
-    u = Coloured("standard uncertainty of a panel's piston", "µm", heights.u_fit[:, 0] * 1e6, 2)
+    u_piston = heights.u_fit[:, 0] * 1e6
+    usual = float(np.median(u_piston))
+    u = Coloured("standard uncertainty of a panel's piston, from the median", "µm", u_piston - usual, 3)
     x_all, y_all = _plane(middle)
     return [
         ChartBlock(
@@ -75,7 +77,9 @@ def surface_charts(heights: "PanelHeights") -> list[ChartBlock]:
             f"which actuators adjust: {rms * 1e6:.0f} µm rms of corners.",
         ),
         ChartBlock(
-            "surface-u", Chart("map", x_all, y_all, value=u, names=panels.tolist()), "Its standard uncertainty."
+            "surface-u",
+            Chart("map", x_all, y_all, value=u, names=panels.tolist()),
+            f"Standard uncertainty of its piston, {usual:.2f} µm in the median.",
         ),
     ]
 
@@ -87,26 +91,13 @@ def turning_charts(work: "PanelWork") -> list[ChartBlock]:
         return []
     demand, got = setting.wanted * 1e6, setting.got * 1e6
     remainder = got - setting.gain * demand
-    ends = np.array([demand.min(), demand.max()])
     x = Axis("requested change", "µm", demand, digits=2)
-    lines = Axis("achieved change", "µm", np.concatenate([ends, setting.gain * ends]), digits=2)
     return [
         ChartBlock(
             "turning",
             Chart("scatter", x, Axis("achieved change", "µm", got, digits=2)),
             "Effect of turning: change of relative heights between the two tables against the requested change; "
             f"achieved {setting.gain:.3f} of it.",
-        ),
-        ChartBlock(
-            "turning-lines",
-            Chart(
-                "line",
-                Axis("requested change", "µm", np.tile(ends, 2), digits=2),
-                lines,
-                group=(0, 0, 1, 1),
-                groups=("requested", f"achieved: {setting.gain:.3f}"),
-            ),
-            "The requested change and the mean of what was achieved.",
         ),
         ChartBlock(
             "turning-scatter",

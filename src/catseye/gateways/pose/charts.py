@@ -24,6 +24,7 @@ from catseye.reduction.pose.track_profile import TrackProfile
 SHARE = 0.12  # length of the largest residual as drawn, share of the group's size
 TITLES = ("azimuth times cos E", "elevation")
 RIGHT = 0.5 * np.pi
+SMALLEST = 1e-9  # m, of a residual that is drawn
 GRID = 121  # points of a curve
 
 
@@ -33,7 +34,7 @@ def pose_blocks(result: PoseFindings) -> list[Block]:
     residual = pose.motion.residual
     largest = float(np.linalg.norm(residual, axis=1).max(initial=0.0))
     size = max(float(np.ptp(places, axis=0).max(initial=0.0)), 1e-3)
-    stretch = SHARE * size / largest if largest > 0.0 else 0.0
+    stretch = SHARE * size / largest if largest > SMALLEST else 0.0
     scene = Scene(
         frame=f"{pose.frame}: x, y, z",
         names=[*pose.names, "pivot"],

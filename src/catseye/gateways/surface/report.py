@@ -153,7 +153,7 @@ def _terms(key: str, expansion: Expansion, settings: ShapeSettings) -> list[Bloc
         TableBlock(key, table),
         Text(
             "Residual: coefficient of the errors after the fit. Absorbed: share of the term's square absorbed by the "
-            "fitted paraboloid or the dish's motion. Term: estimated together with the paraboloid; empty where the "
+            "fitted paraboloid or the dish's motion. Term: estimated together with the paraboloid; unknown where the "
             "paraboloid absorbs it completely.",
             faint=True,
         ),

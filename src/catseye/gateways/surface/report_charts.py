@@ -38,10 +38,15 @@ def change_chart(change: Change) -> Chart:
 def actuator_charts(actuators: Actuators, aperture: LitAperture) -> list[ChartBlock]:
     """Maps of actuator corrections and their standard uncertainty."""
     correction = Coloured("correction", "mm", actuators.correction / MILLIMETRE, 5)
-    u = Coloured("standard uncertainty", "mm", actuators.u_correction / MILLIMETRE, 5)
+    usual = float(np.median(actuators.u_correction))
+    u = Coloured("standard uncertainty, from the median", "mm", (actuators.u_correction - usual) / MILLIMETRE, 5)
     return [
         ChartBlock("actuators", _map(actuators.places, correction, aperture), "Corrections."),
-        ChartBlock("actuators-u", _map(actuators.places, u, aperture), "Their standard uncertainty."),
+        ChartBlock(
+            "actuators-u",
+            _map(actuators.places, u, aperture),
+            f"Their standard uncertainty, {usual / MILLIMETRE:.4f} mm in the median.",
+        ),
     ]
 
 

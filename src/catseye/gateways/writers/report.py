@@ -403,12 +403,8 @@ def origin_section(
     blocks   that go first
     """
     rows = {"made (UTC)": f"{when:%Y-%m-%d %H:%M:%S}", **versions(), **(facts or {})}
-    files = TableBlock("inputs", pairs(inputs, "file read", "SHA-256", hashes=True), folded=_counted(len(inputs)))
+    files = TableBlock("inputs", pairs(inputs, "file read", "SHA-256", hashes=True), folded="Inputs and their SHA-256")
     return Section("provenance", "Provenance", [*blocks, TableBlock("versions", pairs(rows, "item", "value")), files])
-
-
-def _counted(files: int) -> str:
-    return f"Inputs: SHA-256 of {files} file{'' if files == 1 else 's'}"
 
 
 def report_object(report: Report) -> dict[str, Any]:
