@@ -209,10 +209,11 @@ def displacement_view(compared: ComparedEpochs, lengthening: float) -> SceneBloc
         info=_displacement_lines(compared, rows),
         lines=arrows,
     )
+    times = f"{lengthening:,.0f}".replace(",", "\u2009")
     caption = (
-        f"Points by verdict. Lines: displacements, drawn {lengthening:,.0f} times as long; ellipsoids: 95 % of the "
-        "displacements, about no displacement. A point is judged by all of its coordinates together."
-    ).replace(",", "\u2009", 1 if lengthening >= 1000.0 else 0)
+        f"Points by verdict. Lines: displacements, drawn {times} times as long; ellipsoids: 95 % of the displacements, "
+        "about no displacement. A point is judged by all of its coordinates together."
+    )
     return SceneBlock("displacements", scene, caption)
 
 
