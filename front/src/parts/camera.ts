@@ -1,4 +1,5 @@
 // Camera that turns about a point: matrix of view and projection, projection of points on the CPU.
+import { cos, floor, hypot, max, sin, tan } from "./maths";
 export interface Camera { yaw: number; pitch: number; distance: number; target: [number, number, number] }
 
 const SIGHT = 0.42; // rad, whole vertical angle
@@ -6,8 +7,8 @@ const SIGHT = 0.42; // rad, whole vertical angle
 /** Column-major 4 x 4 matrix from the scene to clip space. z is up; yaw 0 looks along +y. */
 export function matrixOf(camera: Camera, aspect: number, extent: number): Float32Array {
   const { right, up, back } = axesOf(camera);
-  const f = 1 / Math.tan(SIGHT / 2);
-  const near = Math.max(camera.distance - 2 * extent, camera.distance * 0.02);
+  const f = 1 / tan(SIGHT / 2);
+  const near = max(camera.distance - 2 * extent, camera.distance * 0.02);
   const far = camera.distance + 2 * extent;
   const rows = [
     [...right.map((v) => (v * f) / aspect), 0], [...up.map((v) => v * f), 0],
@@ -16,13 +17,13 @@ export function matrixOf(camera: Camera, aspect: number, extent: number): Float3
   const eye = camera.target.map((v, i) => v + back[i]! * camera.distance);
   return Float32Array.from({ length: 16 }, (_, i) => {
     const row = rows[i % 4]!;
-    const column = Math.floor(i / 4);
+    const column = floor(i / 4);
     return column < 3 ? row[column]! : row[3]! - (row[0]! * eye[0]! + row[1]! * eye[1]! + row[2]! * eye[2]!);
   });
 }
 
 export function axesOf({ yaw, pitch }: Camera): { right: number[]; up: number[]; back: number[] } {
-  const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
+  const [cy, sy, cp, sp] = [cos(yaw), sin(yaw), cos(pitch), sin(pitch)];
   return { right: [cy, sy, 0], up: [-sy * sp, cy * sp, cp], back: [sy * cp, -cy * cp, sp] };
 }
 
@@ -30,7 +31,7 @@ export function axesOf({ yaw, pitch }: Camera): { right: number[]; up: number[];
 export function projected(m: Float32Array, positions: Float32Array, width: number, height: number): Float32Array {
   const n = positions.length / 3;
   const out = new Float32Array(4 * n);
-  const grow = (Math.hypot(m[1]!, m[5]!, m[9]!) * height) / 2;
+  const grow = (hypot(m[1]!, m[5]!, m[9]!) * height) / 2;
   for (let i = 0; i < n; i++) {
     const [x, y, z] = [positions[3 * i]!, positions[3 * i + 1]!, positions[3 * i + 2]!];
     const w = m[3]! * x + m[7]! * y + m[11]! * z + m[15]!;
@@ -49,7 +50,7 @@ export function picked(screen: Float32Array, size: Float32Array, x: number, y: n
   for (let i = 0; i < screen.length / 4; i++) {
     const depth = screen[4 * i + 2]!;
     if (!(depth > 0)) continue;
-    const away = Math.max(0, Math.hypot(screen[4 * i]! - x, screen[4 * i + 1]! - y) - Math.max(size[i]! * screen[4 * i + 3]!, 2));
+    const away = max(0, hypot(screen[4 * i]! - x, screen[4 * i + 1]! - y) - max(size[i]! * screen[4 * i + 3]!, 2));
     if (away > reach || !visible(i)) continue;
     const rank = away > 0 ? 1e6 * (1 + away) : depth / (depth + 1);
     if (rank < least) (least = rank), (best = i);
@@ -72,6 +73,6 @@ export function fitted(positions: ArrayLike<number>, yaw: number, pitch: number,
   const half = low.map((v, k) => (high[k]! > v ? (high[k]! - v) / 2 : 0));
   const middle = low.map((v, k) => (v <= high[k]! ? (v + high[k]!) / 2 : 0));
   camera.target = [0, 1, 2].map((k) => right[k]! * middle[0]! + up[k]! * middle[1]! + back[k]! * middle[2]!) as Camera["target"];
-  camera.distance = (Math.max(half[1]!, half[0]! / aspect, 1e-6) * 1.22) / Math.tan(SIGHT / 2) + half[2]!;
+  camera.distance = (max(half[1]!, half[0]! / aspect, 1e-6) * 1.22) / tan(SIGHT / 2) + half[2]!;
   return camera;
 }

@@ -2,6 +2,7 @@
 import type { Scene } from "../lib/types";
 import { quantile } from "./dom";
 import { eigen } from "./eigen";
+import { floor, log10, max, min, sqrt } from "./maths";
 
 /** Radius of the 95 % ellipsoid in standard deviations: root of the chi-square quantile 7.8147 of 3 degrees of freedom. */
 export const RADIUS = 2.7955;
@@ -19,9 +20,9 @@ export interface Ellipsoids {
 
 /** Enlargement that makes the median ellipsoid well seen and not larger than the distance of neighbours. */
 export function enlargement(median: number, extent: number, count: number): number {
-  const raw = (extent * Math.min(0.014, 0.3 / Math.sqrt(Math.max(count, 1)))) / median;
+  const raw = (extent * min(0.014, 0.3 / sqrt(max(count, 1)))) / median;
   if (!(raw > 0) || !Number.isFinite(raw)) return 1;
-  const power = 10 ** Math.floor(Math.log10(raw) + 1e-9);
+  const power = 10 ** floor(log10(raw) + 1e-9);
   return power * ([5, 2, 1].find((f) => f * power <= raw * (1 + 1e-9)) ?? 1);
 }
 
@@ -35,7 +36,7 @@ export function ellipsoids(points: Scene["points"], extent: number): Ellipsoids 
     const m = [c.xx[i], c.xy[i], c.xz[i], c.yy[i], c.yz[i], c.zz[i]];
     const solution = m.every((v): v is number => typeof v === "number" && Number.isFinite(v)) ? eigen(m) : null;
     solved.push(solution);
-    if (solution) result.axes[i] = RADIUS * Math.sqrt(Math.max(...solution.values, 0));
+    if (solution) result.axes[i] = RADIUS * sqrt(max(...solution.values, 0));
   }
   const median = quantile(result.axes.filter((a) => a > 0), 0.5);
   if (!(median > 0)) return result;
@@ -45,11 +46,8 @@ export function ellipsoids(points: Scene["points"], extent: number): Ellipsoids 
     const longest = result.axes[i]!;
     const shrink = longest > CAP * median ? (CAP * median) / longest : 1;
     result.capped[i] = shrink < 1 ? 1 : 0;
-    const half = solution.values.map((v) => Math.max(RADIUS * Math.sqrt(Math.max(v, 0)) * shrink, FLOOR * median) * result.factor);
-    // A right-handed set of axes, so that faces look outwards.
-    const [u, v, w] = solution.vectors as [number[], number[], number[]];
-    const det = u[0]! * (v[1]! * w[2]! - v[2]! * w[1]!) - u[1]! * (v[0]! * w[2]! - v[2]! * w[0]!) + u[2]! * (v[0]! * w[1]! - v[1]! * w[0]!);
-    solution.vectors.forEach((axis, k) => axis.forEach((e, j) => (result.matrices[9 * i + 3 * k + j] = e * half[k]! * (k === 2 && det < 0 ? -1 : 1))));
+    const half = solution.values.map((v) => max(RADIUS * sqrt(max(v, 0)) * shrink, FLOOR * median) * result.factor);
+    solution.vectors.forEach((axis, k) => result.matrices.set(axis.map((e) => e * half[k]!), 9 * i + 3 * k));
     result.size[i] = (half[0]! + half[1]! + half[2]!) / 3;
   });
   return result;

@@ -1,325 +1,290 @@
 // Scene: points with 95 % ellipsoids, beams and structure in three dimensions, in raw WebGL 2.
-import type { Scene } from "../lib/types";
+import type { Num, Scene } from "../lib/types";
 import { axesOf, fitted, matrixOf, picked, projected, type Camera } from "./camera";
-import { announce, button, channels, el, extent as spread, onPrint, onScheme, PAPER, palette, scaled, ticks, tip, type Options, type Palette, type Part } from "./dom";
+import { announce, button, channels, context, el, extent as spread, fill, FONT, paper, pixels, scaled, segment, set, stroke, surface, ticks, type Options, type Palette, type Part } from "./dom";
 import { png } from "./download";
 import { ellipsoids, type Ellipsoids } from "./ellipsoids";
 import { drawing, type Drawn } from "./gl";
-import { plain, shown, rounded } from "./number";
+import { plain, rounded, shown } from "./number";
+import { abs, ceil, clamp, floor, hypot, known, log10, max, min, PI, round, sqrt } from "./maths";
 import "./parts.css";
 
-const MANY = 1000; // points above which spheres are coarser and edges not smoothed
-const REACH = 12; // px
-const FONT = "12px system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-const VIEWS: [name: string, yaw: number, pitch: number][] = [["Oblique", -0.6, 0.45], ["Top", 0, Math.PI / 2], ["Front", 0, 0], ["Side", Math.PI / 2, 0]];
+const MANY = 1000; // points above which spheres are coarser, and edges not smoothed without a graphics processor
+const REACH = 12; // px from a point within which it is meant
+const LABELLED = 40; // members up to which the points of a group have labels
+const VIEWS = { Oblique: [-0.6, 0.45], Top: [0, PI / 2], Front: [0, 0], Side: [PI / 2, 0] } as const;
 const SLOW = 120; // ms of a frame above which beams wait until the scene rests
-const PRINT = [680, 460] as const; // px
+const [WIDE, HIGH] = [680, 460]; // px of a picture on paper
+type Entry = [text: string, colour: string, group?: number];
 
 export function scene(host: HTMLElement, data: Scene, options: Options = {}): Part<Scene> {
   const label = options.label ?? "Network";
-  const live = el("canvas", { "aria-hidden": "true" });
-  const over = el("canvas.ce-live", { tabindex: "0", role: "img" });
-  const stage = el("div.ce-stage", {}, live, over);
-  const spoken = el("p.ce-said", { "aria-live": "polite" });
   const legend = el("div.ce-legend");
-  const sheet = el("img.ce-sheet", { alt: label });
-  const withBeams = button("Beams", "Show or hide beams", () => ((beams = !beams), keys(), dirty()));
-  const bar = el("div.ce-bar", {}, ...VIEWS.map(([name, yaw, pitch]) => button(name, `View: ${name.toLowerCase()}`, () => look(yaw, pitch))), withBeams, button("PNG", "Download the picture", () => png(label, composed(2))));
-  const box = el("div.ce-scene", {}, stage, bar, legend, spoken, sheet);
-  const tooltip = tip(stage);
+  const live = el("canvas", { "aria-hidden": "true" });
+  const self = surface(host, "scene", label, { paint, scheme: () => ((stale = true), keys()), raster: () => composed(2) });
+  const { canvas: over, stage, spoken, dirty } = self;
+  const withBeams = button("Beams", () => {
+    beams = !beams;
+    keys();
+    dirty();
+  });
+  stage.prepend(live);
+  spoken.before(legend);
+  self.bar.append(...Object.entries(VIEWS).map(([name, [yaw, pitch]]) => button(name, () => {
+    camera = view(yaw, pitch, width / height || 1.5);
+    dirty();
+  })), withBeams, button("PNG", () => png(label, composed(2))));
 
+  let { points, value } = data;
   let gl: WebGL2RenderingContext | null = null;
   let drawn: Drawn | null = null;
   let shape: Ellipsoids;
   let positions = new Float32Array();
+  let structure: number[] = []; // segments, both ends
   let centre = [0, 0, 0];
   let extent = 1;
   let camera: Camera | null = null;
-  let colours: Palette = palette(host);
-  let hidden = new Set<number>(); // groups
+  const hidden = new Set<number>(); // groups
   let beams = true;
   let selected = -1;
   let hovered = -1;
   let screen = new Float32Array();
   let width = 0;
   let height = 0;
-  let frame = 0;
-  let end = 1;
-  let stale = true; // buffers
+  let end = 1; // of the colours
+  let stale = true; // whether buffers are
   let slow = false;
   let moving = 0;
   let lastFrame = 0;
 
-  const present = (i: number) => Number.isFinite(positions[3 * i]!) && !hidden.has(data.points.group[i] ?? 0);
-  const colourOf = (i: number, c: Palette) => {
-    if (!data.value) return c.group(data.points.group[i] ?? 0);
-    const v = data.value.values[i];
-    return v === null || v === undefined ? c.faint : c.diverging(v / end);
-  };
-  const grade = (w: number | null | undefined) => (w === null || w === undefined ? -1 : Math.abs(w) > 3 ? 2 : Math.abs(w) > 2 ? 1 : 0);
-  const gradeColour = (k: number, c: Palette) => (k === 2 ? c.bad : k === 1 ? c.c1 : c.faint);
+  const groupOf = (i: number) => points.group[i] ?? 0;
+  const present = (i: number) => known(positions[3 * i]) && !hidden.has(groupOf(i));
+  const undetermined = (i: number) => shape.known && Number.isNaN(shape.axes[i]);
+  const grade = (w: Num | undefined) => (!known(w) ? -1 : abs(w) > 3 ? 2 : abs(w) > 2 ? 1 : 0);
+  const gradeColour = (k: number, c: Palette) => [c.faint, c.doubtful, c.bad][max(k, 0)]!;
 
   function measure(): void {
-    const { x, y, z, name } = data.points;
-    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-    const grow = (...p: (number | null | undefined)[]) => {
-      if (p.some((v) => v === null || v === undefined || !Number.isFinite(v))) return;
-      p.forEach((v, k) => ((low[k] = Math.min(low[k]!, v!)), (high[k] = Math.max(high[k]!, v!))));
-    };
-    name.forEach((_, i) => grow(x[i], y[i], z[i]));
-    for (const line of data.lines ?? []) line.x.forEach((v, i) => grow(v, line.y[i], line.z[i]));
-    const solid = low[0]! <= high[0]!;
-    const middle = solid ? low.map((v, k) => (v + high[k]!) / 2) : [0, 0, 0];
+    const { name, x, y, z } = points;
+    const axes = [x, y, z];
+    const lines = data.lines ?? [];
+    const ranges = axes.map((own, k) => {
+      let [low, high] = [Infinity, -Infinity];
+      for (const values of [own, ...lines.map((l) => [l.x, l.y, l.z][k]!)]) for (const v of values) if (known(v)) (low = min(low, v)), (high = max(high, v));
+      return low > high ? [0, 0] : [low, high];
+    });
+    const middle = ranges.map(([low, high]) => (low! + high!) / 2);
     // Positions about the middle: 32 bits are then enough, whatever the frame's origin.
     if (camera) camera.target = camera.target.map((v, k) => v + centre[k]! - middle[k]!) as Camera["target"];
     centre = middle;
-    extent = (solid && Math.hypot(...low.map((v, k) => high[k]! - v))) || 1;
-    positions = Float32Array.from({ length: 3 * name.length }, (_, k) => {
-      const v = [x, y, z][k % 3]![Math.floor(k / 3)];
-      return v === null || v === undefined ? NaN : v - centre[k % 3]!;
-    });
-    shape = ellipsoids(data.points, extent);
-    end = data.value ? spread(data.value.values) : 1;
+    extent = hypot(...ranges.map(([low, high]) => high! - low!)) || 1;
+    positions = Float32Array.from({ length: 3 * name.length }, (_, k) => (axes[k % 3]![(k / 3) | 0] ?? NaN) - middle[k % 3]!);
+    structure = lines.flatMap((l) => l.x.slice(1).flatMap((_, i) => [i, i + 1].flatMap((j) => [l.x[j]! - middle[0]!, l.y[j]! - middle[1]!, l.z[j]! - middle[2]!])));
+    shape = ellipsoids(points, extent);
+    end = spread(value?.values ?? []);
     stale = true;
   }
 
-  function fill(c: Palette): void {
-    const n = data.points.name.length;
-    const paint = new Map<string, number[]>();
-    const rgb = (colour: string) => paint.get(colour) ?? (paint.set(colour, channels(colour)), paint.get(colour)!);
-    const ground = channels(c.paper);
-    const cloud = new Uint8Array(4 * n);
-    const hollow = new Uint8Array(n);
+  function upload(c: Palette): void {
+    const cache = new Map<string, number[]>();
+    const rgb = (colour: string) => cache.get(colour) ?? (cache.set(colour, channels(colour)), cache.get(colour)!);
+    const n = positions.length / 3;
+    const tints: number[] = [];
     for (let i = 0; i < n; i++) {
+      const v = value?.values[i];
+      const colour = rgb(!value ? c.group(groupOf(i)) : known(v) ? c.diverging(v / end) : c.faint);
       // Capped ellipsoids are half way to the ground's colour.
-      const colour = rgb(colourOf(i, c));
-      cloud.set([...colour.map((v, k) => (shape.capped[i] ? (v + ground[k]!) / 2 : v)), present(i) ? 255 : 0], 4 * i);
-      hollow[i] = shape.known && Number.isNaN(shape.axes[i]) ? 1 : 0;
+      tints.push(...colour.map((tint, k) => (shape.capped[i] ? (tint + rgb(c.paper)[k]!) / 2 : tint)), present(i) ? 255 : 0);
     }
-    const b = data.beams;
-    // Largest |w| last, above the others.
-    const order = (b?.from ?? []).map((_, k) => k).sort((i, j) => Math.abs(b!.value[i] ?? 0) - Math.abs(b!.value[j] ?? 0));
-    const light = Math.min(0.5, 0.12 + 60 / (order.length + 1));
-    const [ends, at, tint, wide] = [new Float32Array(6 * order.length), new Float32Array(2 * order.length), new Uint8Array(4 * order.length), new Uint8Array(order.length)];
-    order.forEach((k, i) => {
-      const [f, t] = [b!.from[k]!, b!.to[k]!];
-      const g = grade(b!.value[k]);
-      ends.set([...positions.subarray(3 * f, 3 * f + 3), ...positions.subarray(3 * t, 3 * t + 3)], 6 * i);
-      at.set([f, t], 2 * i);
-      tint.set([...rgb(gradeColour(g, c)), present(f) && present(t) ? 255 * (g === 2 ? 1 : g === 1 ? 0.8 : light) : 0], 4 * i);
-      wide[i] = g === 2 ? 20 : g === 1 ? 14 : 10;
-    });
-    const segments: number[] = [];
-    for (const line of data.lines ?? []) for (let i = 1; i < line.x.length; i++) {
-      for (const j of [i - 1, i]) segments.push(line.x[j]! - centre[0]!, line.y[j]! - centre[1]!, line.z[j]! - centre[2]!);
+    // Structure first, then beams with the largest |w| last, above the others.
+    const { from = [], to = [], value: ws = [] } = data.beams ?? {};
+    const order = from.map((_, k) => k).sort((i, j) => abs(ws[i] ?? 0) - abs(ws[j] ?? 0));
+    const ends = [...structure], at: number[] = [], hues: number[] = [], wide: number[] = [];
+    for (let i = 0; i < structure.length; i += 6) at.push(-2, -2), hues.push(...rgb(c.faint), 200), wide.push(14);
+    const opaque = [0, 1, 2].map((k) => 255 * min(1, [0.1, 0.3, 0.7][k]! + 60 / (1 + ws.filter((w) => max(grade(w), 0) === k).length)));
+    for (const k of order) {
+      const [f, t, g] = [from[k]!, to[k]!, max(grade(ws[k]), 0)];
+      ends.push(...positions.subarray(3 * f, 3 * f + 3), ...positions.subarray(3 * t, 3 * t + 3));
+      at.push(f, t);
+      hues.push(...rgb(gradeColour(g, c)), present(f) && present(t) ? opaque[g]! : 0);
+      wide.push(10 + 5 * g);
     }
-    drawn?.fill({
-      positions: positions.map((v) => (Number.isNaN(v) ? 0 : v)), matrices: shape.matrices, colours: cloud, hollow,
-      ellipsoids: shape.known, dot: shape.known ? 3 : n > MANY ? 4 : 7,
-      beams: ends, beamEnds: at, beamColours: tint, beamWide: wide, lines: new Float32Array(segments), lineColour: rgb(c.faint).map((v) => v / 255),
-    });
+    drawn!.fill([
+      positions.map((v) => v || 0), shape.matrices, new Uint8Array(tints), Uint8Array.from({ length: n }, (_, i) => Number(undetermined(i))),
+      new Float32Array(ends), new Float32Array(at), new Uint8Array(hues), new Uint8Array(wide),
+    ]);
     stale = false;
   }
 
   function begin(): void {
-    gl = live.getContext("webgl2", { antialias: data.points.name.length <= MANY, alpha: false, preserveDrawingBuffer: false });
-    drawn = gl && drawing(gl, data.points.name.length <= MANY);
+    const few = points.name.length <= MANY;
+    const ask = (more: WebGLContextAttributes) => live.getContext("webgl2", { alpha: false, ...more });
+    gl = ask({ failIfMajorPerformanceCaveat: true }) ?? ask({ antialias: few });
+    drawn = gl && drawing(gl, few);
     stale = true;
-    if (!drawn) {
-      stage.replaceChildren(el("p.ce-none", { role: "note" }, "This browser cannot draw in three dimensions (WebGL 2). The table has all points with their coordinates and uncertainties."));
-      for (const child of [...bar.children]) (child as HTMLElement).hidden = true;
-    }
+    if (drawn) return;
+    stage.replaceChildren(el("p.ce-none", {}, "This browser has no WebGL 2 to draw in space: the table has all points and uncertainties."));
+    self.bar.hidden = true;
   }
+
+  /** Camera for all points and lines. */
+  const view = (yaw: number, pitch: number, aspect: number) => fitted([...positions, ...structure], yaw, pitch, aspect);
 
   /** Draw into both canvases at a size and a ratio. */
   function render(w: number, h: number, ratio: number, c: Palette, all: boolean): void {
     if (!drawn) return;
-    camera ??= view(VIEWS[0]![1], VIEWS[0]![2], w / h);
-    for (const canvas of [live, over]) {
-      const [cw, ch] = [Math.round(w * ratio), Math.round(h * ratio)];
-      if (canvas.width !== cw || canvas.height !== ch) (canvas.width = cw), (canvas.height = ch);
-    }
-    if (stale) fill(c);
+    camera ??= view(...VIEWS.Oblique, w / h);
+    const [across, down] = [round(w * ratio), round(h * ratio)];
+    if (live.width !== across || live.height !== down) Object.assign(live, { width: across, height: down });
+    if (stale) upload(c);
     const m = matrixOf(camera, w / h, extent);
     const { back } = axesOf(camera);
-    drawn.draw(m, camera.target.map((v, k) => v + back[k]! * camera!.distance), [w, h], ratio, selected, beams && all, channels(c.paper).map((v) => v / 255));
+    const eye = camera.target.map((v, k) => v + back[k]! * camera!.distance);
+    const n = positions.length / 3;
+    drawn.draw(m, eye, [w, h], ratio, selected, structure.length / 6 + (beams && all ? (data.beams?.from.length ?? 0) : 0), shape.known ? 3 : n > MANY ? 4 : 7, channels(c.paper).map((v) => v / 255));
     screen = projected(m, positions, w, h) as Float32Array<ArrayBuffer>;
-    overlay(w, h, ratio, c);
+    overlay(w, h, ratio, c, (hypot(m[1]!, m[5]!, m[9]!) * h) / 2 / camera.distance);
   }
 
-  function overlay(w: number, h: number, ratio: number, c: Palette): void {
-    const g = over.getContext("2d")!;
-    g.setTransform(ratio, 0, 0, ratio, 0, 0);
-    g.clearRect(0, 0, w, h);
-    g.font = FONT;
-    g.textBaseline = "middle";
-    g.lineJoin = "round";
+  /** Labels, rings, words and directions above the picture; scale in pixels per metre at the middle. */
+  function overlay(w: number, h: number, ratio: number, c: Palette, scale: number): void {
+    const g = context(over, w, h, ratio);
     const write = (text: string, x: number, y: number, colour = c.ink) => {
+      g.lineJoin = "round";
       g.strokeStyle = c.paper;
       g.lineWidth = 3;
       g.strokeText(text, x, y);
       g.fillStyle = colour;
       g.fillText(text, x, y);
     };
-    // Labels where they find room: the chosen point, then small groups first (rangers), foremost first.
-    const sizes = data.groups.map((_, k) => data.points.group.filter((v) => v === k).length);
-    const order = data.points.name.map((_, i) => i).filter((i) => screen[4 * i + 2]! > 0 && present(i) && (i === selected || sizes[data.points.group[i]!]! <= 40));
-    order.sort((i, j) => Number(j === selected) - Number(i === selected) || sizes[data.points.group[i]!]! - sizes[data.points.group[j]!]! || screen[4 * i + 2]! - screen[4 * j + 2]!);
-    const taken: number[][] = [[0, h - 64, 70, h], [0, 0, 240, 40]];
-    for (const i of order.slice(0, 90)) {
-      const [x, y, wide] = [screen[4 * i]!, screen[4 * i + 1]!, g.measureText(data.points.name[i]!).width];
-      const away = Math.max(6, shape.size[i]! * screen[4 * i + 3]! + 3);
+    const places = (i: number) => [screen[4 * i]!, screen[4 * i + 1]!, max(6, shape.size[i]! * screen[4 * i + 3]! + 3)] as const;
+    const seen = (i: number) => i >= 0 && screen[4 * i + 2]! > 0 && present(i);
+    // Labels where they find room: the chosen point, then small groups (rangers), foremost first.
+    const sizes = data.groups.map(() => 0);
+    points.group.forEach((k) => sizes[k]!++);
+    const rank = (i: number) => (i === selected ? 0 : sizes[groupOf(i)]! + screen[4 * i + 2]! / (12 * extent + screen[4 * i + 2]!));
+    const taken = [[0, h - 64, 70, h], [0, 0, 260, 40]];
+    for (const i of points.name.map((_, k) => k).filter((k) => seen(k) && (k === selected || sizes[groupOf(k)]! <= LABELLED)).sort((i, j) => rank(i) - rank(j)).slice(0, 90)) {
+      const name = points.name[i]!;
+      const [x, y, away] = places(i);
+      const wide = g.measureText(name).width;
       for (const [lx, ly] of [[x + away, y], [x - away - wide, y], [x - wide / 2, y - away - 7], [x - wide / 2, y + away + 7]] as const) {
-        const room = [lx - 2, ly - 7, lx + wide + 2, ly + 7];
-        if (lx < 2 || lx + wide > w - 2 || ly < 8 || ly > h - 8 || taken.some((r) => room[0]! < r[2]! && room[2]! > r[0]! && room[1]! < r[3]! && room[3]! > r[1]!)) continue;
-        taken.push(room);
-        write(data.points.name[i]!, lx, ly, i === selected ? c.accent : c.ink);
+        if (lx < 2 || lx + wide > w - 2 || ly < 8 || ly > h - 8 || taken.some((r) => lx - 2 < r[2]! && lx + wide + 2 > r[0]! && ly - 7 < r[3]! && ly + 7 > r[1]!)) continue;
+        taken.push([lx - 2, ly - 7, lx + wide + 2, ly + 7]);
+        write(name, lx, ly, i === selected ? c.accent : c.ink);
         break;
       }
     }
-    for (const [i, dash] of [[selected, []], [hovered, [3, 3]]] as [number, number[]][]) {
-      if (i < 0 || !(screen[4 * i + 2]! > 0) || !present(i)) continue;
-      g.strokeStyle = c.ink;
-      g.lineWidth = 2;
-      g.setLineDash(dash);
-      g.beginPath();
-      g.arc(screen[4 * i]!, screen[4 * i + 1]!, Math.max(8, shape.size[i]! * screen[4 * i + 3]! + 3), 0, 7);
-      g.stroke();
-      g.setLineDash([]);
+    for (const i of [selected, hovered]) if (seen(i)) {
+      const [x, y, r] = places(i);
+      stroke(g, c.ink, i === selected ? 2.5 : 1, () => g.arc(x, y, r + 2, 0, 7));
     }
-    // In words: frame and enlargement; length and directions.
     write(`frame ${data.frame}`, 8, 12, c.faint);
-    if (shape.known) write(`95 % ellipsoids × ${plain(shape.factor)}${shape.capped.some(Boolean) ? "; pale: capped, true size larger" : ""}`, 8, 28, c.faint);
+    if (shape.known) write(`95 % ellipsoids × ${plain(shape.factor)}${shape.capped.includes(1) ? "; pale: capped, truly larger" : ""}`, 8, 28, c.faint);
     const { right, up, back } = axesOf(camera!);
-    [0, 1, 2].sort((i, j) => back[i]! - back[j]!).forEach((k) => {
-      const [x, y] = [34 + 22 * right[k]!, h - 34 - 22 * up[k]!];
-      g.strokeStyle = g.fillStyle = c.ink;
-      g.lineWidth = 1.5;
-      g.beginPath();
-      g.moveTo(34, h - 34);
-      g.lineTo(x, y);
-      g.stroke();
-      g.textAlign = "center";
-      if (Math.abs(back[k]!) < 0.97) write("xyz"[k]!, 34 + 31 * right[k]!, h - 34 - 31 * up[k]!);
-      g.textAlign = "left";
+    [..."xyz"].forEach((name, k) => {
+      const [x, y] = [right[k]!, -up[k]!];
+      stroke(g, c.ink, 1.5, () => segment(g, 34, h - 34, 34 + 22 * x, h - 34 + 22 * y));
+      if (abs(back[k]!) < 0.97) write(name, 31 + 31 * x, h - 34 + 31 * y);
     });
-    const scaleAt = (Math.hypot(...[1, 5, 9].map((k) => matrixOf(camera!, w / h, extent)[k]!)) * h) / 2 / camera!.distance;
-    const length = ticks(0, 90 / scaleAt, 1.2).step;
+    const length = ticks(0, 90 / scale, 1.2).step;
     const [factor, unit] = scaled(length, "m");
-    const x = w - 12 - length * scaleAt;
-    g.strokeStyle = c.ink;
-    g.beginPath();
-    for (const [px, py] of [[x, h - 18], [x, h - 12], [w - 12, h - 12], [w - 12, h - 18]] as const) g.lineTo(px, py);
-    g.stroke();
+    const x = w - 12 - length * scale;
+    stroke(g, c.ink, 2, () => [[x, 18], [x, 12], [w - 12, 12], [w - 12, 18]].forEach(([a, b]) => g.lineTo(a!, h - b!)));
     g.textAlign = "right";
     write(`${plain(length * factor)} ${unit}`, w - 14, h - 24);
-    g.textAlign = "left";
   }
 
-  function paint(now: number): void {
-    frame = 0;
-    width = stage.clientWidth;
-    if (!width || !drawn) return;
-    height = Math.round(Math.min(Math.max(width * 0.62, 300), 560));
-    stage.style.height = `${height}px`;
+  function paint(w: number, now: number): void {
+    width = w;
+    height = round(clamp(width * 0.62, 300, 560));
+    if (drawn) stage.style.height = `${height}px`;
     // In a slow renderer beams wait while the scene moves.
     if (moving && lastFrame) slow = now - lastFrame > SLOW;
     lastFrame = moving ? now : 0;
-    render(width, height, Math.min(devicePixelRatio || 1, 2), colours, !(slow && moving));
+    render(width, height, pixels(), self.colours, !(slow && moving));
   }
-  function dirty(): void {
-    frame ||= requestAnimationFrame(paint);
-  }
-  function move(): void {
+  function moved(): void {
     clearTimeout(moving);
-    moving = setTimeout(() => ((moving = 0), slow && dirty()), 180);
-    tooltip.hide();
-    hovered = -1;
+    moving = setTimeout(() => {
+      moving = 0;
+      if (slow) dirty();
+    }, 180);
+    hover(-1);
     dirty();
   }
 
   /** Both canvases and the legend in one picture on paper. */
   function composed(ratio: number): HTMLCanvasElement {
-    const c = PAPER();
+    const c = paper(host);
     const picture = el("canvas");
-    const [w, h] = PRINT;
     const entries = keyList(c);
-    picture.width = w * ratio;
-    picture.height = (h + 22 * Math.ceil(entries.length / 3)) * ratio;
-    const g = picture.getContext("2d")!;
-    g.fillStyle = c.paper;
-    g.fillRect(0, 0, picture.width, picture.height);
+    const g = context(picture, WIDE, HIGH + 22 * ceil(entries.length / 3), ratio, c.paper);
     stale = true;
-    render(w, h, ratio, c, true);
-    for (const canvas of [live, over]) if (drawn) g.drawImage(canvas, 0, 0);
-    g.scale(ratio, ratio);
+    render(WIDE, HIGH, ratio, c, true);
+    if (drawn) for (const layer of [live, over]) g.drawImage(layer, 0, 0, WIDE, HIGH);
     g.font = FONT;
     entries.forEach(([text, colour], i) => {
-      const [x, y] = [8 + (w / 3) * (i % 3), h + 14 + 22 * Math.floor(i / 3)];
-      g.fillStyle = colour || c.paper;
-      g.fillRect(x, y - 8, 16, 10);
+      const [x, y] = [8 + (WIDE / 3) * (i % 3), HIGH + 12 + 22 * ((i / 3) | 0)];
+      if (colour) fill(g, colour, () => g.rect(x, y - 6, 14, 10));
       g.fillStyle = c.ink;
-      g.fillText(text, x + 22, y, w / 3 - 30);
+      g.fillText(text, x + 20, y, WIDE / 3 - 30);
     });
     stale = true;
     dirty();
     return picture;
   }
 
-  /** Texts and colours of the legend; the group where an entry can be switched off. */
-  function keyList(c: Palette): [text: string, colour: string, group: number | null][] {
-    const list: [string, string, number | null][] = data.groups.map((name, k) => [name, data.value ? c.faint : c.group(k), k]);
-    if (data.value) {
-      const [factor, unit] = scaled(end, data.value.unit);
-      for (const s of [-1, 0, 1]) list.push([`${data.value.label} ${s ? (s < 0 ? "≤ \u2212" : "≥ +") + plain(Number((end * factor).toPrecision(2))) : 0} ${unit}`, c.diverging(s), null]);
+  /** Texts and colours of the legend, and the group that an entry switches. */
+  function keyList(c: Palette): Entry[] {
+    const list: Entry[] = data.groups.map((name, k) => [name, value ? "" : c.group(k), k]);
+    if (value) {
+      const [factor, unit] = scaled(end, value.unit);
+      const bound = plain(Number((end * factor).toPrecision(2)));
+      list.push([`${value.label} \u2212${bound} ${unit}`, c.diverging(-1)], ["0", c.mid], [`+${bound} ${unit}`, c.high]);
     }
-    if (data.points.name.some((_, i) => shape.known && Number.isNaN(shape.axes[i]))) list.push(["○ undetermined: no ellipsoid", "", null]);
+    if (shape.axes.some((_, i) => undetermined(i))) list.push(["○ undetermined: no ellipsoid", ""]);
     const values = beams ? (data.beams?.value ?? []) : [];
-    const count = (k: number) => values.filter((w) => grade(w) === k).length;
-    if (values.length) {
-      list.push([`|w| below 2 (${count(0)})`, gradeColour(0, c), null], [`|w| 2 to 3 (${count(1)})`, gradeColour(1, c), null], [`|w| above 3 (${count(2)})`, gradeColour(2, c), null]);
-      if (count(-1)) list.push([`w unknown (${count(-1)})`, c.faint, null]);
-    }
+    ["w unknown", "|w| below 2", "|w| 2 to 3", "|w| above 3"].forEach((text, k) => {
+      const count = values.filter((w) => grade(w) === k - 1).length;
+      if (count) list.push([`${text} (${count})`, gradeColour(k - 1, c)]);
+    });
     return list;
   }
 
   function keys(): void {
     withBeams.hidden = !data.beams?.from.length;
-    withBeams.setAttribute("aria-pressed", String(beams));
-    legend.replaceChildren(...keyList(colours).map(([text, colour, group]) => {
+    set(withBeams, { "aria-pressed": beams });
+    legend.replaceChildren(...keyList(self.colours).map(([text, colour, group]) => {
       const swatch = el("i");
       swatch.style.background = colour;
       swatch.hidden = !colour;
-      if (group === null || data.groups.length < 2) return el("span", {}, swatch, text);
-      const press = button("", "Show or hide this group", () => {
+      if (group === undefined || data.groups.length < 2) return el("span", {}, swatch, text);
+      const press = button(text, () => {
         if (!hidden.delete(group)) hidden.add(group);
         stale = true;
         keys();
-        (legend.children[group] as HTMLElement | undefined)?.focus();
+        (legend.children[group] as HTMLElement).focus();
         dirty();
       });
-      press.append(swatch, text);
-      press.setAttribute("aria-pressed", String(!hidden.has(group)));
+      press.prepend(swatch);
+      set(press, { "aria-pressed": !hidden.has(group) });
       return press;
     }));
   }
 
   function lines(i: number): string[] {
-    const p = data.points;
-    const c = p.covariance;
-    const place = (["x", "y", "z"] as const).map((k) => {
-      const variance = c?.[(k + k) as "xx"][i];
-      return `${k} ${shown(p[k][i] ?? null, variance && variance > 0 ? Math.sqrt(variance) : null, "m")}`;
-    });
-    const out = [p.name[i]!, ...place];
-    if (shape.known) {
-      const longest = shape.axes[i]!;
-      const [f, unit] = scaled(longest, "m");
-      out.push(Number.isNaN(longest) ? "undetermined: no ellipsoid" : `95 % half axis ${longest > 0 ? rounded(longest * f, Math.max(0, 1 - Math.floor(Math.log10(longest * f)))) : 0} ${unit}${shape.capped[i] ? " (drawn smaller: capped)" : ""}`);
-    }
-    if (data.value) out.push(`${data.value.label} ${shown(data.value.values[i] ?? null, null, data.value.unit)}`);
-    if (p.info?.[i]) out.push(p.info[i]);
-    return out;
+    const p = points;
+    const list = [p.name[i]!, ...(["x", "y", "z"] as const).map((k) => {
+      const variance = p.covariance?.[`${k}${k}` as "xx"][i];
+      return `${k} ${shown(p[k][i]!, known(variance) ? sqrt(variance) : null, "m")}`;
+    })];
+    const axis = shape.axes[i]!;
+    const [f, unit] = scaled(axis, "m");
+    if (undetermined(i)) list.push("undetermined: no ellipsoid");
+    else if (axis > 0) list.push(`95 % half axis ${rounded(axis * f, max(0, 1 - floor(log10(axis * f))))} ${unit}${shape.capped[i] ? " (drawn smaller: capped)" : ""}`);
+    if (value) list.push(`${value.label} ${shown(value.values[i]!, null, value.unit)}`);
+    if (p.info?.[i]) list.push(p.info[i]);
+    return list;
   }
 
   function mark(i: number): void {
@@ -329,62 +294,48 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   }
   function pick(i: number): void {
     mark(i);
-    if (i >= 0) announce(host, data.points.name[i]!, options.select);
+    if (i >= 0) announce(host, points.name[i]!, options.select);
   }
-  function look(yaw: number, pitch: number): void {
-    camera = view(yaw, pitch, width / height || 1.5);
-    dirty();
-  }
-  /** Camera for all points and lines. */
-  function view(yaw: number, pitch: number, aspect: number): Camera {
-    const structure = (data.lines ?? []).flatMap((l) => l.x.flatMap((v, i) => [v - centre[0]!, l.y[i]! - centre[1]!, l.z[i]! - centre[2]!]));
-    return fitted([...positions, ...structure], yaw, pitch, aspect);
+  function hover(i: number): void {
+    self.show(screen[4 * i] ?? 0, screen[4 * i + 1] ?? 0, i < 0 ? [] : lines(i));
+    over.style.cursor = i < 0 ? "" : "pointer";
+    hovered = i;
   }
   function turn(dx: number, dy: number): void {
     camera!.yaw -= dx;
-    camera!.pitch = Math.min(Math.max(camera!.pitch + dy, -Math.PI / 2), Math.PI / 2);
-    move();
+    camera!.pitch = clamp(camera!.pitch + dy, -PI / 2, PI / 2);
+    moved();
   }
   function shift(dx: number, dy: number): void {
     const { right, up } = axesOf(camera!);
     const s = (camera!.distance * 0.43) / height;
     camera!.target = camera!.target.map((v, k) => v - (dx * right[k]! - dy * up[k]!) * s) as Camera["target"];
-    move();
+    moved();
   }
   function zoom(f: number): void {
-    camera!.distance = Math.min(Math.max(camera!.distance * f, extent * 1e-3), extent * 12);
-    move();
+    camera!.distance = clamp(camera!.distance * f, extent * 1e-3, extent * 12);
+    moved();
   }
 
-  // Mouse and fingers -------------------------------------------------------------------------------------------------
+  // Mouse, fingers, keys ----------------------------------------------------------------------------------------------
   const fingers = new Map<number, [number, number]>();
   let travelled = 0;
-  const at = (event: PointerEvent): [number, number] => {
-    const r = over.getBoundingClientRect();
-    return [event.clientX - r.left, event.clientY - r.top];
-  };
   const under = ([x, y]: [number, number]) => picked(screen, shape.size, x, y, REACH, present);
   over.onpointerdown = (event) => {
-    fingers.set(event.pointerId, at(event));
+    fingers.set(event.pointerId, [event.offsetX, event.offsetY]);
     over.setPointerCapture(event.pointerId);
-    if (fingers.size === 1) travelled = 0;
+    if (fingers.size < 2) travelled = 0;
   };
   over.onpointermove = (event) => {
-    const to = at(event);
+    const to: [number, number] = [event.offsetX, event.offsetY];
     const before = fingers.get(event.pointerId);
-    if (!before) {
-      const i = under(to);
-      if (i >= 0) tooltip.show(...to, lines(i));
-      else tooltip.hide();
-      if (i !== hovered) (hovered = i), over.width && overlay(width, height, over.width / width, colours);
-      over.style.cursor = i >= 0 ? "pointer" : "grab";
-      return;
-    }
+    if (!camera) return;
+    if (!before) return hover(under(to));
     const [dx, dy] = [to[0] - before[0], to[1] - before[1]];
-    travelled += Math.hypot(dx, dy);
-    if (fingers.size === 2) {
-      const other = [...fingers].find(([id]) => id !== event.pointerId)![1];
-      const apart = (p: [number, number]) => Math.hypot(p[0] - other[0], p[1] - other[1]) || 1;
+    travelled += hypot(dx, dy);
+    const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) {
+      const apart = (p: [number, number]) => hypot(p[0] - other[0], p[1] - other[1]) || 1;
       zoom(apart(before) / apart(to));
       shift(dx / 2, dy / 2);
     } else if (travelled > 4) {
@@ -394,89 +345,76 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     fingers.set(event.pointerId, to);
   };
   over.onpointerup = over.onpointercancel = (event) => {
-    const clicked = fingers.size === 1 && travelled <= 4 && event.type === "pointerup" && event.button === 0;
+    if (fingers.size < 2 && travelled <= 4 && event.type === "pointerup" && !event.button) pick(under([event.offsetX, event.offsetY]));
     fingers.delete(event.pointerId);
-    if (!clicked) return;
-    const i = under(at(event));
-    if (i >= 0) pick(i);
-    else mark(-1);
   };
-  over.onpointerleave = () => {
-    tooltip.hide();
-    if (hovered >= 0) (hovered = -1), dirty();
-  };
+  over.onpointerleave = () => hover(-1);
   over.oncontextmenu = (event) => event.preventDefault();
-  // The wheel zooms once the scene was clicked; else the page scrolls.
+  // The wheel zooms once the scene was clicked; before, the page scrolls.
   over.addEventListener("wheel", (event) => {
-    if (document.activeElement !== over && !event.ctrlKey) return;
+    if (!camera || (document.activeElement !== over && !event.ctrlKey)) return;
     event.preventDefault();
-    zoom(Math.exp(Math.min(Math.max(event.deltaY, -120), 120) * 0.0016));
+    zoom(Math.exp(clamp(event.deltaY, -120, 120) * 0.0016));
   }, { passive: false });
+  const KEYS: Record<string, (far: boolean) => void> = {
+    ArrowLeft: (far) => (far ? shift(30, 0) : turn(-0.1, 0)),
+    ArrowRight: (far) => (far ? shift(-30, 0) : turn(0.1, 0)),
+    ArrowUp: (far) => (far ? shift(0, 30) : turn(0, -0.1)),
+    ArrowDown: (far) => (far ? shift(0, -30) : turn(0, 0.1)),
+    "+": () => zoom(0.85),
+    "=": () => zoom(0.85),
+    "-": () => zoom(1.18),
+    Home: () => ((camera = null), dirty()),
+    Escape: () => mark(-1),
+    PageDown: () => step(1),
+    PageUp: () => step(-1),
+  };
+  function step(by: number): void {
+    const n = points.name.length;
+    let i = selected < 0 && by < 0 ? 0 : selected;
+    for (let k = 0; k < n; k++) {
+      i = (i + by + n) % n;
+      if (present(i)) return pick(i);
+    }
+  }
   over.onkeydown = (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || !camera) return;
-    const [x, y] = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] } as Record<string, [number, number]>)[event.key] ?? [0, 0];
-    const step = { PageDown: 1, PageUp: -1 }[event.key];
-    if (x || y) event.shiftKey ? shift(-x * 30, -y * 30) : turn(x * 0.1, y * 0.1);
-    else if (event.key === "+" || event.key === "=") zoom(0.85);
-    else if (event.key === "-") zoom(1.18);
-    else if (event.key === "Home") look(VIEWS[0]![1], VIEWS[0]![2]);
-    else if (event.key === "Escape") mark(-1);
-    else if (step) {
-      const n = data.points.name.length;
-      for (let k = 1, i = selected; k <= n; k++) {
-        i = (i + step + (i < 0 && step < 0 ? 1 : 0) + n) % n;
-        if (present(i)) {
-          pick(i);
-          break;
-        }
-      }
-    } else return;
+    const act = KEYS[event.key];
+    if (!act || !camera || event.ctrlKey || event.altKey || event.metaKey) return;
     event.preventDefault();
+    act(event.shiftKey);
   };
   live.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     drawn = null;
-    spoken.textContent = "The graphics system took the picture away; waiting for it.";
+    spoken.textContent = "The browser took the picture's memory away; waiting for it.";
   });
   live.addEventListener("webglcontextrestored", () => {
-    spoken.textContent = "";
     begin();
-    dirty();
+    mark(selected);
   });
 
-  const stop = [
-    onPrint(() => (sheet.src = composed(2).toDataURL()), () => (sheet.removeAttribute("src"), dirty())),
-    onScheme(() => ((colours = palette(host)), (stale = true), keys(), dirty())),
-  ];
-  const resize = new ResizeObserver(() => stage.clientWidth !== width && dirty());
-
   function update(next: Scene): void {
-    const name = selected >= 0 ? data.points.name[selected] : null;
+    const name = points.name[selected];
     data = next;
-    hovered = -1;
+    ({ points, value } = data);
     measure();
-    mark(name ? data.points.name.indexOf(name) : -1);
-    over.setAttribute("aria-label", `${label}. ${data.points.name.length} points in three dimensions; the table has their values. Arrow keys turn, plus and minus zoom, Home shows all, Page Down and Page Up choose a point.`);
+    mark(name === undefined ? -1 : points.name.indexOf(name));
+    hover(-1);
+    set(over, { "aria-label": `${label}. ${points.name.length} points in space; the table has their values. Arrow keys turn, plus and minus zoom, Home shows all, Page Down and Page Up choose a point.` });
     keys();
-    dirty();
   }
-  host.append(box);
   begin();
   update(data);
-  resize.observe(stage);
   return {
     update,
     select(name) {
-      const i = name === null ? -1 : data.points.name.indexOf(name);
+      const i = name === null ? -1 : points.name.indexOf(name);
       if (i !== selected) mark(i);
     },
     destroy() {
-      cancelAnimationFrame(frame);
       clearTimeout(moving);
-      resize.disconnect();
-      for (const end of stop) end();
       gl?.getExtension("WEBGL_lose_context")?.loseContext();
-      box.remove();
+      self.destroy();
     },
   };
 }
