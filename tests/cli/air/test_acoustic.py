@@ -11,7 +11,7 @@ from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import read_sheet, wav_bytes, wav_samples
 from catseye.signal.delay.arrival import DelayPlan
 from catseye.signal.delay.waveform import sampled
-from report_scene import column
+from report_scene import column, read
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "acoustic"
@@ -91,8 +91,8 @@ def test_out_and_write_appear_whole(catseye, tmp_path):
     assert len(rows) == 5
     assert rows[1].startswith("61365.1000002")
     assert ",ZY103,ZEG41040L,14.96" in rows[1]
-    read = Folder(tmp_path).table(table.name, PathTemperature)  # as a campaign does
-    assert [row.u_temperature_c for row in read] == pytest.approx([0.0747, 0.0747, 0.0742, 0.0742], abs=2e-3)
+    listed = Folder(tmp_path).table(table.name, PathTemperature)  # as a campaign does
+    assert [row.u_temperature_c for row in listed] == pytest.approx([0.0747, 0.0747, 0.0742, 0.0742], abs=2e-3)
     report = read((out / "report.html").read_text())
     assert {key.partition("-")[0] for key in report["charts"]} == {
         "recording", "correlation", "peak", "temperature", "wind",

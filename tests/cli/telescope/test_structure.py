@@ -204,7 +204,7 @@ def test_ranges_at_full_rate_show_the_planted_vibration(catseye, journal, tmp_pa
     assert len(np.asarray(tables["RANGES"].mjd)) == 3200
     report = read((out / "report.html").read_text())
     assert report["drawings"]["spectra"].startswith("<?xml")
-    assert column(report, "peaks", "observed")[0] == pytest.approx(top["observed_hz"], abs=1e-5)
+    assert column(report, "peaks", "true")[0] == pytest.approx(top["likely_hz"], abs=1e-5)
     status, said, _ = catseye("structure", "--vibration", journal, "--points", "ZEG1")
     assert status == 0
     assert "1.2" in said
