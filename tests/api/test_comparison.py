@@ -9,7 +9,7 @@ import pytest
 
 import catseye
 from catseye.errors import EstimationError
-from report_scene import column, read, texts, words_of
+from gateways.report_scene import column, read, texts, words_of
 from repository import TESTS
 
 EPOCHS = TESTS / "vectors" / "networks" / "epochs"

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from report_scene import column, read, words_of
+from gateways.report_scene import column, read, words_of
 from repository import ROOT
 
 DATA = ROOT / "examples" / "baselines" / "busselton"

@@ -15,11 +15,11 @@ from catseye.gateways.writers.report import (
     DrawingBlock,
     Heading,
     Items,
-    Report,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     Scene,
     SceneBlock,
-    Section,
-    Table,
     TableBlock,
     Text,
     categories,
@@ -98,7 +98,7 @@ def texts(report):
 
 def every_part():
     """A report with a block of every kind."""
-    table = Table(
+    table = ReportTable(
         (
             text("point", "point", ["A", "B"]),
             number("x", "x", np.array([1.23456789012, np.nan]), "m", 5, u="u"),
@@ -141,10 +141,10 @@ def every_part():
         DrawingBlock("drawing", "<svg/>", "a drawing"),
         None,
     ]
-    return Report(
+    return ResultReport(
         title="Title",
         subtitle="of a test",
         verdict=Verdict("good", "all fits"),
-        sections=[Section("first", "First", blocks), None],
+        sections=[ReportSection("first", "First", blocks), None],
         cards=[Card("u", "1 mm", "largest")],
     )

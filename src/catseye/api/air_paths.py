@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.air.refractometer_calibration import PathCalibration
     from catseye.reduction.air.sound_path import AcousticReduction
 
@@ -109,7 +109,7 @@ class AcousticResult(Result):
 
         return {"table": SinglePage(MARK, lambda now, path: path_temperatures_csv(self.reduction.paths))}
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.air.acoustic_report import acoustic_report
 
@@ -228,7 +228,7 @@ class RefractometerResult(Result):
 
         return refractometer_figures(self.calibration)
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.air.refractometer_report import refractometer_report
 

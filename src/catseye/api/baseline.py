@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.baseline.result import BaselineCalibration
 
 LARGEST = 1e4  # mm, ppm, °C, hPa, %: beyond it a unit was meant otherwise
@@ -110,7 +110,7 @@ class BaselineResult(Result):
 
         return {"record": SinglePage(MARK, text)}
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.baseline.report import baseline_report
 

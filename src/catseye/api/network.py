@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from catseye.api.network_source import NetworkSource
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.network.adjusted import AdjustedNetwork
     from catseye.reduction.network.comparison import ComparedEpochs
     from catseye.reduction.network.treatment import AdjustmentOptions
@@ -197,7 +197,7 @@ class AdjustmentResult(Result):
             network = self.path or self.adjusted.network.source or "the network"
             raise EstimationError(f"{network}: {self.status}")
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         self.require_answer()
         from catseye.gateways.network.report import network_report
@@ -414,7 +414,7 @@ class ComparisonResult(Result):
 
         return {name: drawn.figure for name, drawn in comparison_figures(self.compared).items()}
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.network.comparison_report import comparison_report
 

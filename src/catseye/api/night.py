@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.night.campaign import Campaign
     from catseye.reduction.budget.explanation import Explanation
     from catseye.reduction.epoch.epoch import Reduction
@@ -132,7 +132,7 @@ class NightResult(Result):
 
         return figures(self.reduction)
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.epoch.report import reduction_report
 
@@ -249,7 +249,7 @@ class ExplanationResult(Result):
         """The page that `--page` writes, as explanation.html, with the table and the JSON."""
         self.write_files(directory, progress, {"explanation.html": self._page})
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of the page that `--page` writes, made at a time, UTC."""
         from catseye.gateways.epoch.explain_page import explanation_report
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.panels.layout import PanelLayout
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.panels.job import PanelWork
@@ -109,7 +109,7 @@ class PanelsResult(Result):
 
         return panel_figures(self.work)
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.panels.report import panels_report
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from catseye.api.network_source import NetworkSource
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.network.plan import PlannedNetwork
 
 
@@ -92,7 +92,7 @@ class PlanResult(Result):
         drawn = network_figures(self.planned.predicted)
         return {name: drawn[name].figure for name in ("plan", "elevation") if name in drawn}
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.network.plan import plan_report
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.geometry.antenna.pointing_series import PointingSeries
     from catseye.records.laboratory.star_offsets import StarOffsets
     from catseye.records.network.written_pose import WrittenPose
@@ -106,7 +106,7 @@ class SeriesResult(Result):
 
         return fit_figures(self.findings.fit)
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.pose.pointing_series_files import fit_report
 

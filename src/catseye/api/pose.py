@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.pose.findings import PoseFindings
@@ -122,7 +122,7 @@ class PoseResult(Result):
 
         return pose_figures(self.found)
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.pose.files import pose_report
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.verdict import Verdict
 
 
@@ -104,7 +104,7 @@ class Result:
             raise InputError(f"a {type(self).__name__} has no report; its tables are to_table()")
         return report_object(made)
 
-    def _report(self, when: "datetime") -> "Report | None":
+    def _report(self, when: "datetime") -> "ResultReport | None":
         """Report, made at a time, UTC; None unless a result has one."""
         return None
 

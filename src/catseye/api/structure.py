@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.reduction.structure.epochs import ReadEpochs
     from catseye.reduction.structure.findings import StructureFindings
@@ -141,7 +141,7 @@ class StructureResult(Result):
             "residuals": residual_figure(self.found.fit, self.found.check),
         }
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.structure.report import structure_report
 
@@ -229,7 +229,7 @@ class VibrationResult(Result):
 
         return {"spectra": spectrum_figure(self.found)}
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.structure.report import vibration_report
 

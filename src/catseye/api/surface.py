@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.optics.zernike import Numbering
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.surface.actuators import Travel
@@ -144,7 +144,7 @@ class SurfaceResult(Result):
             drawn["actuators"] = actuator_map(found.actuators, shape.aperture)
         return drawn
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.surface.report import surface_report
 

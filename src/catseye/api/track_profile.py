@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.gateways.writers.report import Report
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.laboratory.tilts import TiltReadings
     from catseye.records.network.written_pose import WrittenPose
     from catseye.reduction.pose.track_profile import TrackProfile
@@ -93,7 +93,7 @@ class TrackProfileResult(Result):
 
         return track_figures(self.profile)
 
-    def _report(self, when: "datetime") -> "Report":
+    def _report(self, when: "datetime") -> "ResultReport":
         """Report of `report.html`, made at a time, UTC."""
         from catseye.gateways.pose.pointing_series_files import track_report
 

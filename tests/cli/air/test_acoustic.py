@@ -11,7 +11,7 @@ from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import read_sheet, wav_bytes, wav_samples
 from catseye.signal.delay.arrival import DelayPlan
 from catseye.signal.delay.waveform import sampled
-from report_scene import column, read
+from gateways.report_scene import column, read
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "acoustic"

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from command_scene import COMMAND, attempt
+from gateways.report_scene import column, read, texts, words_of
 from panel_scene import EXAMPLE
-from report_scene import column, read, texts, words_of
 
 TOOL = ["--instrument", EXAMPLE / "tool.toml"]
 FOUND = EXAMPLE / "as-found.csv"

@@ -8,7 +8,7 @@ import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.antenna.pointing_series import published
-from report_scene import column, read
+from gateways.report_scene import column, read
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples" / "pointing"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND
+from gateways.report_scene import column, read
 from kept_scene import reduction_directory
-from report_scene import column, read
 from repository import ROOT
 
 NIGHT = ROOT / "examples" / "night-01"

@@ -15,8 +15,8 @@ from catseye.geometry.frames.rotation import from_vector
 from catseye.records.network.solved_points import FORMAT
 from catseye.records.night.live import LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
+from gateways.report_scene import column, read, texts
 from journal_scene import START, scene_run
-from report_scene import column, read, texts
 
 NAMES = ("ZEG1", "ZEG2", "ZEG3", "ZEG4", "ZEG5")
 REST = np.array([[0.0, 5, 40], [8, 6, 48], [-8, 7, 50], [1, 12, 58], [0, 3, 62]])

@@ -15,7 +15,7 @@ from catseye.gateways.writers.objects import json_line
 from catseye.gateways.writers.report_page import report_page
 from catseye.reduction.budget.explanation import explain_shot
 from catseye.reduction.budget.scene import Assumptions
-from report_scene import column, read, row, texts, words_of
+from gateways.report_scene import column, read, row, texts, words_of
 
 WHEN = datetime(2026, 1, 2, tzinfo=UTC)
 KEYS = {

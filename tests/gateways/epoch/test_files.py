@@ -18,8 +18,8 @@ from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.matrix_fits import BLOCK
 from catseye.gateways.writers.objects import plain
 from catseye.records.network.solved_points import read_solved_points
+from gateways.report_scene import read, texts
 from kept_scene import reduction_directory, reduction_of_example
-from report_scene import read, texts
 
 
 @pytest.fixture(scope="module")

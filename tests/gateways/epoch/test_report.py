@@ -17,7 +17,7 @@ from catseye.gateways.writers.report import report_object
 from catseye.gateways.writers.report_page import report_page
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.reason import Reason, ShotStatus
-from report_scene import blocks, column, read, texts, words_of
+from gateways.report_scene import blocks, column, read, texts, words_of
 
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 

@@ -37,7 +37,7 @@ from catseye.reduction.network.adjusted import adjusted, adjusted_network
 from catseye.reduction.network.comparison import ComparedEpochs
 from catseye.reduction.network.treatment import AdjustmentOptions
 from column_scene import assert_columns
-from report_scene import read, texts
+from gateways.report_scene import read, texts
 from repository import TESTS
 
 LENGTHS = {"slope_distance", "horizontal_distance", "height_difference", "vector", "coordinates"}  # kinds in m

@@ -26,7 +26,7 @@ from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
 from catseye.reduction.network.adjusted import adjusted_network
 from catseye.reduction.network.comparison import ComparedEpochs
-from report_scene import column, read, row, texts
+from gateways.report_scene import column, read, row, texts
 from repository import TESTS
 
 NETWORKS = TESTS / "vectors" / "networks"

@@ -23,7 +23,7 @@ from catseye.records.files.reading import read_record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.unit import reduce_triplet
 from column_scene import assert_columns
-from report_scene import column, read, row, words_of
+from gateways.report_scene import column, read, row, words_of
 from triplet_scene import SHEET, document, measurement
 
 # section 3.4, in the order of the memo; T1, T2, S and so on are points

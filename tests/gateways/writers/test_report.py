@@ -5,16 +5,16 @@ import json
 import pytest
 
 from catseye.gateways.writers.report import (
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     number,
     pairs,
     report_object,
     text,
 )
-from report_scene import every_part
+from gateways.report_scene import every_part
 
 
 def test_json_has_the_shapes_of_the_front_ends_types():
@@ -64,7 +64,7 @@ def test_json_has_the_shapes_of_the_front_ends_types():
 
 
 def test_a_report_without_verdict_says_null():
-    report = report_object(Report("Title", "", None, []))
+    report = report_object(ResultReport("Title", "", None, []))
     assert report["verdict"] is None
     assert report["sections"] == []
 
@@ -72,7 +72,7 @@ def test_a_report_without_verdict_says_null():
 def test_two_parts_cannot_have_one_key():
     blocks = [TableBlock("inputs", pairs({"a": "b"}, "file", "SHA-256"))] * 2
     with pytest.raises(ValueError, match="two parts of a report have the key 'inputs'"):
-        report_object(Report("Title", "", None, [Section("s", "S", blocks)]))
+        report_object(ResultReport("Title", "", None, [ReportSection("s", "S", blocks)]))
 
 
 def test_columns_of_different_lengths_or_of_one_key_are_a_mistake():
@@ -81,9 +81,9 @@ def test_columns_of_different_lengths_or_of_one_key_are_a_mistake():
         (text("a", "a", ["x"]), text("a", "b", ["y"])),
     ):
         with pytest.raises(ValueError, match="columns of different lengths or of one key"):
-            Table(columns).to_object()
+            ReportTable(columns).to_object()
 
 
 def test_an_empty_table_has_its_columns():
-    table = Table.of_rows([], text("point", "point"), number("x", "x")).to_object()
+    table = ReportTable.of_rows([], text("point", "point"), number("x", "x")).to_object()
     assert [(c["key"], c["values"]) for c in table["columns"]] == [("point", []), ("x", [])]

@@ -14,9 +14,9 @@ from catseye.gateways.writers.report import (
     Card,
     Chart,
     ChartBlock,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     report_object,
@@ -25,7 +25,7 @@ from catseye.gateways.writers.report import (
 from catseye.gateways.writers.report_page import report_page
 from catseye.records.files.report_file import report_in
 from catseye.verdict import Verdict
-from report_scene import read, words_of
+from gateways.report_scene import read, words_of
 
 HOSTILE = [
     "</script><script>alert(1)</script>",
@@ -38,12 +38,12 @@ HOSTILE = [
 
 
 def hostile_report(name):
-    table = Table((text("name", name, [name]), text("value", "value", ["1"])), "name")
-    return Report(
+    table = ReportTable((text("name", name, [name]), text("value", "value", ["1"])), "name")
+    return ResultReport(
         title=name,
         subtitle=name,
         verdict=Verdict("doubtful", name),
-        sections=[Section("s", name, [Text(name), TableBlock(name, table, name, name)])],
+        sections=[ReportSection("s", name, [Text(name), TableBlock(name, table, name, name)])],
         cards=[Card(name, name, name)],
         passages=[Passage(name, name)],
     )
@@ -87,7 +87,7 @@ def test_a_column_that_occurs_twice_is_stored_once():
     charts = [
         ChartBlock(key, Chart("scatter", Axis("n", "", list(range(100))), Axis("w", "", w)), "") for key in ("a", "b")
     ]
-    report = Report("Title", "", None, [Section("s", "S", charts)])
+    report = ResultReport("Title", "", None, [ReportSection("s", "S", charts)])
     page = report_page(report)
     stored = data_of(page)
     assert stored["charts"]["a"]["y"]["values"] == {"shared": 1}

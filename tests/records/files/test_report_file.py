@@ -10,7 +10,7 @@ from catseye.errors import InputError
 from catseye.gateways.writers.report_page import report_page
 from catseye.records.files import report_file
 from catseye.records.files.report_file import DATA, read_report, report_in
-from report_scene import every_part
+from gateways.report_scene import every_part
 
 
 @pytest.fixture(scope="module")

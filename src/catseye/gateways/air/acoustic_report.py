@@ -19,9 +19,9 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     Heading,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -58,9 +58,9 @@ def write_acoustic(reduction: "AcousticReduction", directory: Path, progress: Pr
     write_files(files, directory, {**provenance, **origin(when, reduction.inputs)}, progress=progress)
 
 
-def acoustic_report(reduction: "AcousticReduction", when: datetime) -> Report:
+def acoustic_report(reduction: "AcousticReduction", when: datetime) -> ResultReport:
     """Report of acoustic paths; `when` is UTC."""
-    return Report(
+    return ResultReport(
         title="Temperature by sound",
         subtitle=f"reduced by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ",
         verdict=reduction.verdict,
@@ -85,8 +85,8 @@ def _cards(path: "AcousticPath") -> list[Card]:
     ]
 
 
-def _section(number_: int, path: "AcousticPath") -> Section:
-    return Section(
+def _section(number_: int, path: "AcousticPath") -> ReportSection:
+    return ReportSection(
         f"path-{number_}",
         f"{path.sheet.ranger} to {path.sheet.target}",
         [
@@ -106,14 +106,14 @@ def _budget(path: "AcousticPath", key: str) -> list[Block]:
     rows = [(name, float(part[k])) for name, part in path.temperatures.parts_c.items()]
     rows.append(("combined", float(path.temperatures.u_temperature_c[k])))
     lead = "Standard uncertainty of the first used shot by cause; causes add in quadrature."
-    table = Table.of_rows(rows, text("cause", "cause"), uncertainty("u", "u", unit="°C", digits=4))
+    table = ReportTable.of_rows(rows, text("cause", "cause"), uncertainty("u", "u", unit="°C", digits=4))
     return [Text(lead), TableBlock(key, table)]
 
 
-def _shots(path: "AcousticPath") -> Table:
+def _shots(path: "AcousticPath") -> ReportTable:
     shots, air = path.shots, path.temperatures
     back = np.full(len(shots.mjd), np.nan) if shots.time_ba is None else shots.time_ba
-    return Table(
+    return ReportTable(
         (
             number("mjd", "MJD", shots.mjd, digits=6),
             text("file", "file", shots.file),

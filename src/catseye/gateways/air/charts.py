@@ -111,13 +111,14 @@ def _index(calibration: "PathCalibration") -> ChartBlock:
 
 
 def _residual(calibration: "PathCalibration") -> ChartBlock:
-    states = ("good", "weather off")
-    rows = np.flatnonzero(np.isin(calibration.status, states) & np.isfinite(calibration.residual))
+    used = np.array([status == "good" for status in calibration.status])
+    out = np.array([status == "weather off" for status in calibration.status])
+    rows = np.flatnonzero((used | out) & np.isfinite(calibration.residual))
     chart = Chart(
         "scatter",
         _refractometer_hours(calibration, rows),
         Axis("weather − path", "ppm", calibration.residual[rows] / PPM, digits=4),
-        group=[states.index(calibration.status[k]) for k in rows],
+        group=np.where(used[rows], 0, 1),
         groups=("used", "excluded"),
         limits=(0.0,),
     )

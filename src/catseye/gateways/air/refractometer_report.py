@@ -15,9 +15,9 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.report import (
     Card,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -172,14 +172,14 @@ def _length(calibration: "PathCalibration") -> str:
     )
 
 
-def refractometer_report(calibration: "PathCalibration", when: datetime) -> Report:
+def refractometer_report(calibration: "PathCalibration", when: datetime) -> ResultReport:
     """Report of a refractometer path; `when` is UTC."""
     sheet = calibration.readings.sheet
     good = f"{calibration.status.count('good')} of {len(calibration.readings)}"
     index = f"{calibration.index_0 / PPM:.3f} ± {calibration.u_index_0 / PPM:.3f} ppm"
     causes = [(cause, part / PPM) for cause, part in calibration.budget.items()]
     thermometers = [(name, v, u) for name, (v, u) in calibration.thermometers.items()]
-    return Report(
+    return ResultReport(
         title=f"{sheet.path}: refractometer",
         subtitle=f"calibrated by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ",
         verdict=calibration.verdict,
@@ -190,19 +190,21 @@ def refractometer_report(calibration: "PathCalibration", when: datetime) -> Repo
         ],
         passages=passages(calibration),
         sections=[
-            Section("night", "The night", refractometer_charts(calibration)),
-            Section(
+            ReportSection("night", "The night", refractometer_charts(calibration)),
+            ReportSection(
                 "budget",
                 "Budget",
                 [
                     Text("Standard uncertainty of the calibrated index by cause; causes add in quadrature."),
                     TableBlock(
                         "budget",
-                        Table.of_rows(causes, text("cause", "cause"), uncertainty("u", "u", unit="ppm", digits=4)),
+                        ReportTable.of_rows(
+                            causes, text("cause", "cause"), uncertainty("u", "u", unit="ppm", digits=4)
+                        ),
                     ),
                     TableBlock(
                         "thermometers",
-                        Table.of_rows(
+                        ReportTable.of_rows(
                             thermometers,
                             text("thermometer", "thermometer"),
                             number("offset", "reads too high", unit="°C", digits=3, u="u"),

@@ -15,9 +15,9 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     ChartBlock,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from catseye.reduction.baseline.result import BaselineCalibration
 
 
-def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> Report:
+def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: Mapping[str, str]) -> ResultReport:
     """Report of a baseline.
 
     calibration   a calibration
@@ -39,7 +39,7 @@ def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: 
     """
     charts = baseline_charts(calibration)
     settings = {key: str(value) for key, value in vars(calibration.settings).items()}
-    return Report(
+    return ResultReport(
         title=f"{Path(calibration.observations.file).name}: EDM baseline",
         subtitle=(
             f"adjusted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; observed = (1 + scale) × "
@@ -50,7 +50,7 @@ def baseline_report(calibration: "BaselineCalibration", when: datetime, inputs: 
         passages=[p for p in passages(calibration) if p.title != "Test"],
         sections=[
             _pillars(calibration, charts.pop("line")),
-            Section("residuals", "Residuals", list(charts.values())),
+            ReportSection("residuals", "Residuals", list(charts.values())),
             _tests(calibration),
             _budget(calibration),
             _sets(calibration),
@@ -78,8 +78,8 @@ def _cards(calibration: "BaselineCalibration") -> list[Card]:
     ]
 
 
-def _pillars(calibration: "BaselineCalibration", line: ChartBlock) -> Section:
-    pillars = Table.of_rows(
+def _pillars(calibration: "BaselineCalibration", line: ChartBlock) -> ReportSection:
+    pillars = ReportTable.of_rows(
         [(name, p.x, p.u_x / MILLIMETRE, p.y, p.u_y / MILLIMETRE, p.height) for name, p in calibration.pillars.items()],
         text("pillar", "pillar"),
         number("x", "x", unit="m", digits=5),
@@ -89,7 +89,7 @@ def _pillars(calibration: "BaselineCalibration", line: ChartBlock) -> Section:
         number("height", "height", unit="m", digits=4),
         name="pillar",
     )
-    spans = Table.of_rows(
+    spans = ReportTable.of_rows(
         [(a, b, d, u / MILLIMETRE) for a, b, d, u in calibration.spans],
         text("from", "from"),
         text("to", "to"),
@@ -100,14 +100,14 @@ def _pillars(calibration: "BaselineCalibration", line: ChartBlock) -> Section:
         "one height" if calibration.reference_height is None else f"the height {calibration.reference_height:.3f} m"
     )
     lead = f"Horizontal distances at {height}; their full covariance is in baseline.json and BASELINE.toml."
-    return Section(
+    return ReportSection(
         "pillars", "Pillars", [line, TableBlock("pillars", pillars), Text(lead), TableBlock("distances", spans)]
     )
 
 
-def _tests(calibration: "BaselineCalibration") -> Section:
+def _tests(calibration: "BaselineCalibration") -> ReportSection:
     outcome = {True: "passed", False: "failed", None: "not possible"}
-    table = Table.of_rows(
+    table = ReportTable.of_rows(
         [(d.name, d.statistic, d.limit, outcome[d.passed], d.text) for d in calibration.decisions],
         text("test", "test", kind="long"),
         number("statistic", "statistic"),
@@ -121,10 +121,10 @@ def _tests(calibration: "BaselineCalibration") -> Section:
         "not from the scatter under test. A set, its repeats averaged, counts as one distance."
     )
     first = Text(f"Failed: {'; '.join(failed)}." if failed else "Every test passes.")
-    return Section("tests", "Tests", [first, Text(lead), TableBlock("tests", table)])
+    return ReportSection("tests", "Tests", [first, Text(lead), TableBlock("tests", table)])
 
 
-def _budget(calibration: "BaselineCalibration") -> Section:
+def _budget(calibration: "BaselineCalibration") -> ReportSection:
     s = calibration.solution
     last = f"x {calibration.order[-1]}"
     parameters = [n for n in ("zero", "scale", *calibration.cyclic, last) if n in s.names]
@@ -137,22 +137,22 @@ def _budget(calibration: "BaselineCalibration") -> Section:
         uncertainty(f"u_{k + 1}", head, unit="ppm" if n == "scale" else "mm", digits=4)
         for k, (head, n) in enumerate(zip(heads, parameters, strict=True))
     )
-    return Section(
+    return ReportSection(
         "budget",
         "Budget",
         [
             Text("Standard uncertainty by cause; causes are independent and add in quadrature."),
-            TableBlock("budget", Table.of_rows(rows, text("cause", "cause"), *columns)),
+            TableBlock("budget", ReportTable.of_rows(rows, text("cause", "cause"), *columns)),
         ],
     )
 
 
-def _sets(calibration: "BaselineCalibration") -> Section:
+def _sets(calibration: "BaselineCalibration") -> ReportSection:
     s, shots = calibration.solution, calibration.observations
     first = np.flatnonzero(calibration.keep)[s.used.first]
     residuals = calibration.shot_residuals[calibration.keep]
     scatter = [float(np.std(residuals[s.used.set == k])) / MILLIMETRE for k in range(len(s.residual))]
-    table = Table(
+    table = ReportTable(
         (
             text("from", "from", [calibration.names[shots.start[row]] for row in first]),
             text("to", "to", [calibration.names[shots.end[row]] for row in first]),
@@ -167,4 +167,6 @@ def _sets(calibration: "BaselineCalibration") -> Section:
     )
     left_out = [f"row {k + 1}: {why}" for k, why in enumerate(calibration.rejected) if why]
     blocks: list[Block] = [Text("Excluded: " + "; ".join(left_out))] if left_out else []
-    return Section("sets", "Sets", [*blocks, TableBlock("sets", table), Text("All shots are in observations.csv.")])
+    return ReportSection(
+        "sets", "Sets", [*blocks, TableBlock("sets", table), Text("All shots are in observations.csv.")]
+    )

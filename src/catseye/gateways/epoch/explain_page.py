@@ -20,9 +20,9 @@ from catseye.gateways.writers.report import (
     Card,
     Chart,
     ChartBlock,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -38,7 +38,7 @@ MARK = "<title>catseye: shot "  # identifies a page of catseye
 MOST_DRAWS = 20_000  # in the histogram
 
 
-def explanation_report(explanation: Explanation, campaign: Campaign, made_at: datetime) -> Report:
+def explanation_report(explanation: Explanation, campaign: Campaign, made_at: datetime) -> ResultReport:
     """Report of a shot.
 
     campaign   of the shot
@@ -50,7 +50,7 @@ def explanation_report(explanation: Explanation, campaign: Campaign, made_at: da
     sections = (
         [] if explanation.budget is None else [_budget(explanation), _scattered(explanation), _references(explanation)]
     )
-    return Report(
+    return ResultReport(
         title=f"Shot {explanation.shot} of {name}",
         subtitle=(
             f"{explanation.ranger} on {explanation.target}, {when(explanation)}; explained by catseye on "
@@ -82,7 +82,7 @@ def _cards(explanation: Explanation) -> list[Card]:
     ]
 
 
-def _budget(explanation: Explanation) -> Section:
+def _budget(explanation: Explanation) -> ReportSection:
     budget = explanation.budget
     assert budget is not None
     order = np.argsort(-np.abs(budget.share), kind="stable").tolist()
@@ -101,7 +101,7 @@ def _budget(explanation: Explanation) -> Section:
         ),
         names=names,
     )
-    table = Table(
+    table = ReportTable(
         (
             text("input", "input", [item.given.name for item in items]),
             number("value", "value", [item.given.value for item in items]),
@@ -125,10 +125,10 @@ def _budget(explanation: Explanation) -> Section:
         TableBlock("budget", table),
         Text(remark, faint=True),
     ]
-    return Section("budget", "Budget", blocks)
+    return ReportSection("budget", "Budget", blocks)
 
 
-def _scattered(explanation: Explanation) -> Section | None:
+def _scattered(explanation: Explanation) -> ReportSection | None:
     """Draws of the range; None without a Monte Carlo."""
     budget, scattered = explanation.budget, explanation.scattered
     if budget is None or scattered is None:
@@ -152,12 +152,12 @@ def _scattered(explanation: Explanation) -> Section | None:
         "the phasors, a path of the drifting electronics, the air along the path, the glass and its tilt."
     )
     chart = ChartBlock("histogram", Chart("histogram", x, limits=ends), caption)
-    return Section("monte-carlo", "Monte Carlo", [Text(lead), chart])
+    return ReportSection("monte-carlo", "Monte Carlo", [Text(lead), chart])
 
 
-def _references(explanation: Explanation) -> Section:
+def _references(explanation: Explanation) -> ReportSection:
     lead = "Their weighted mean is the phase of the electronics at this shot; the weights follow from the walk."
-    table = Table.of_rows(
+    table = ReportTable.of_rows(
         explanation.references,
         number("shot", "shot", digits=0),
         number("after", "after this one", unit="s", digits=0),
@@ -165,4 +165,4 @@ def _references(explanation: Explanation) -> Section:
         name="shot",
     )
     blocks: list[Block | None] = [Text(lead), TableBlock("references", table)]
-    return Section("references", "Reference shots", blocks)
+    return ReportSection("references", "Reference shots", blocks)

@@ -24,10 +24,10 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     ChartBlock,
-    Report,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     SceneBlock,
-    Section,
-    Table,
     TableBlock,
     Text,
     number,
@@ -43,12 +43,12 @@ from catseye.reduction.epoch.surface import UNOBSERVED
 from catseye.reduction.epoch.verdict import factor_spread
 
 
-def reduction_report(reduction: Reduction, when: datetime, progress: Progress | None = None) -> Report:
+def reduction_report(reduction: Reduction, when: datetime, progress: Progress | None = None) -> ResultReport:
     """Report of a reduction; `progress` is called for the dish's pose."""
     if progress is not None:
         progress("page: dish pose by each command", 0, 1)
     name = reduction.campaign.site.campaign.name
-    return Report(
+    return ResultReport(
         title=f"{name}: coordinates, pose and surface",
         subtitle=(
             f"from {len(reduction.campaign.shots)} shots in {reduction.campaign.directory.resolve().name}/, reduced by "
@@ -101,14 +101,14 @@ def _cards(reduction: Reduction) -> list[Card]:
     ]
 
 
-def _feed_arm(reduction: Reduction) -> Section:
+def _feed_arm(reduction: Reduction) -> ReportSection:
     rows = feed_arm_rows(reduction)
     if not rows:
-        return Section("feed-arm", "Feed arm", [Text("No ranger on the feed arm was seen.")])
+        return ReportSection("feed-arm", "Feed arm", [Text("No ranger on the feed arm was seen.")])
     columns = (text("point", "ranger"), *_xyz(), *_u_xyz())
-    table = Table.of_rows([(name, *x, *u) for name, x, u in rows], *columns, name="point")
+    table = ReportTable.of_rows([(name, *x, *u) for name, x, u in rows], *columns, name="point")
     text_ = "Scan points of the rangers on the feed arm: the points where their two mirror axes meet."
-    return Section("feed-arm", "Feed arm", [Text(text_), TableBlock("feed-arm", table)])
+    return ReportSection("feed-arm", "Feed arm", [Text(text_), TableBlock("feed-arm", table)])
 
 
 def _xyz() -> list:
@@ -119,12 +119,12 @@ def _u_xyz() -> list:
     return [uncertainty(f"u_{axis}", f"u {axis}", unit="mm", digits=3) for axis in "xyz"]
 
 
-def _dish(reduction: Reduction) -> Section:
+def _dish(reduction: Reduction) -> ReportSection:
     surface, aim = reduction.surface, pointing(reduction)
     if surface is None or aim is None:
-        return Section("dish", "Dish", [Text(f"No pose and no surface: {reduction.no_surface}.")])
+        return ReportSection("dish", "Dish", [Text(f"No pose and no surface: {reduction.no_surface}.")])
     posture = reduction.campaign.site.campaign
-    return Section(
+    return ReportSection(
         "dish",
         "Dish",
         [
@@ -169,21 +169,21 @@ def _pose(reduction: Reduction) -> list[Block]:
         ("focus", *pose["focus"]),
         ("axis (unit vector)", *pose["axis"]),
     ]
-    moved = Table.of_rows(
+    moved = ReportTable.of_rows(
         motion,
         text("component", "against the nominal posture"),
         number("value", "value", digits=3, u="u"),
         uncertainty("u", "u", digits=3),
     )
-    placed = Table.of_rows(
+    placed = ReportTable.of_rows(
         places, text("place", "in the ground frame"), *(number(a, a, unit="m", digits=6) for a in "xyz")
     )
     return [TableBlock("pose", moved), TableBlock("places", placed)]
 
 
-def _prisms(prisms: PrismRows) -> Table:
+def _prisms(prisms: PrismRows) -> ReportTable:
     fit = prisms.surface.fit
-    return Table(
+    return ReportTable(
         (
             text("point", "prism", prisms.surface.names),
             *(number(f"{a}_dish", f"{a} in the dish's frame", fit.local[:, k], "m", 5) for k, a in enumerate("xyz")),
@@ -195,25 +195,25 @@ def _prisms(prisms: PrismRows) -> Table:
     )
 
 
-def _network(reduction: Reduction) -> Section:
+def _network(reduction: Reduction) -> ReportSection:
     caption = (
         "All points with their 95 % ellipsoids; lines are used ranges, coloured by the standardised residual w. A "
         "point that the ranges do not determine in some direction has a large ellipsoid, which is capped and marked."
     )
-    return Section("network", "Network", [SceneBlock("network", network_scene(reduction), caption)])
+    return ReportSection("network", "Network", [SceneBlock("network", network_scene(reduction), caption)])
 
 
-def _residuals(reduction: Reduction) -> Section:
+def _residuals(reduction: Reduction) -> ReportSection:
     limit = reduction.settings.critical
     lead = (
         "The residual is observed minus adjusted; w is the residual over its own standard deviation. A shot with |w| "
         f"above {limit:g} is rejected."
     )
     charts = [ChartBlock(key, chart, caption) for key, (chart, caption) in residual_charts(reduction).items()]
-    return Section("residuals", "Residuals", [Text(lead), *charts])
+    return ReportSection("residuals", "Residuals", [Text(lead), *charts])
 
 
-def _rejected(reduction: Reduction) -> Section:
+def _rejected(reduction: Reduction) -> ReportSection:
     shots = reduction.campaign.shots
     rows = []
     for k, shot in enumerate(shots.shot):
@@ -221,8 +221,8 @@ def _rejected(reduction: Reduction) -> Section:
         if reason is not None:
             rows.append((int(shot), shots.ranger[k], shots.target[k], str(reason.status), reason.text))
     if not rows:
-        return Section("rejected", "Rejected shots", [Text("None.")])
-    table = Table.of_rows(
+        return ReportSection("rejected", "Rejected shots", [Text("None.")])
+    table = ReportTable.of_rows(
         rows,
         number("shot", "shot", digits=0),
         text("ranger", "ranger"),
@@ -232,10 +232,10 @@ def _rejected(reduction: Reduction) -> Section:
         name="shot",
     )
     lead = f"{len(rows)} of {len(shots)} shots. They stay in ranges.csv with their reasons."
-    return Section("rejected", "Rejected shots", [Text(lead), TableBlock("rejected", table)])
+    return ReportSection("rejected", "Rejected shots", [Text(lead), TableBlock("rejected", table)])
 
 
-def _rangers(reduction: Reduction) -> Section:
+def _rangers(reduction: Reduction) -> ReportSection:
     campaign, coordinates = reduction.campaign, reduction.coordinates
     amplitude, kinds = reduction.phases.amplitude, kinds_of(reduction)
     rows = []
@@ -256,7 +256,7 @@ def _rangers(reduction: Reduction) -> Section:
                 float(np.median(amplitude[used])) if used else None,
             )
         )
-    table = Table.of_rows(
+    table = ReportTable.of_rows(
         rows,
         text("point", "ranger"),
         text("mirror", "mirror"),
@@ -269,7 +269,7 @@ def _rangers(reduction: Reduction) -> Section:
         number("amplitude", "return", unit="V", digits=2),
         name="point",
     )
-    return Section(
+    return ReportSection(
         "rangers",
         "Rangers",
         [
@@ -280,7 +280,7 @@ def _rangers(reduction: Reduction) -> Section:
     )
 
 
-def _air(reduction: Reduction) -> Section:
+def _air(reduction: Reduction) -> ReportSection:
     *stations, (profile, (value, u)) = reduction.coordinates.air.items()
     rows = [(f"{name}: thermometer reads too high by", v, s, "°C") for name, (v, s) in stations]
     label, unit = (
@@ -293,14 +293,14 @@ def _air(reduction: Reduction) -> Section:
         (f"{line}: acoustic temperature too high by", warm, s, "°C")
         for line, (warm, s) in reduction.coordinates.sound.items()
     ]
-    estimated = Table.of_rows(
+    estimated = ReportTable.of_rows(
         rows,
         text("parameter", f"estimated with the coordinates (model {reduction.settings.air_model})"),
         number("value", "value", digits=4, u="u"),
         uncertainty("u", "u", digits=4),
         text("unit", "unit"),
     )
-    return Section(
+    return ReportSection(
         "air",
         "Air",
         [
@@ -344,7 +344,7 @@ def _benchmarks(reduction: Reduction) -> list[Block]:
         "Each benchmark path is a refractometer: n_g − 1 (ppm) from its phase, its certificate and the ranger's sheet, "
         "compared with the weather stations as read and as adjusted."
     )
-    table = Table.of_rows(
+    table = ReportTable.of_rows(
         rows,
         text("point", "benchmark"),
         text("ranger", "ranger"),
@@ -361,9 +361,9 @@ def _benchmarks(reduction: Reduction) -> list[Block]:
     return [Text(lead), TableBlock("benchmarks", table)]
 
 
-def _points(reduction: Reduction) -> Section:
+def _points(reduction: Reduction) -> ReportSection:
     coordinates, rows = reduction.coordinates, PointRows(reduction)
-    table = Table(
+    table = ReportTable(
         (
             text("point", "point", coordinates.points),
             text("kind", "kind", list(kinds_of(reduction).values())),
@@ -378,14 +378,14 @@ def _points(reduction: Reduction) -> Section:
         f"the full matrix in {matrix_file(coordinates.points)}. A large u means that the ranges do not determine that "
         "direction and it rests on the typed position."
     )
-    return Section("points", "Points", [Text(lead), TableBlock("points", table)])
+    return ReportSection("points", "Points", [Text(lead), TableBlock("points", table)])
 
 
-def _shots(reduction: Reduction) -> Section:
+def _shots(reduction: Reduction) -> ReportSection:
     """Every shot on a target that has a phase."""
     ranges, shots = reduction.coordinates.ranges, reduction.campaign.shots
     status = [str(reduction.status[k]) for k in ranges.shot.tolist()]
-    table = Table(
+    table = ReportTable(
         (
             number("shot", "shot", shots.shot[ranges.shot], digits=0),
             text("ranger", "ranger", ranges.ranger),
@@ -400,10 +400,10 @@ def _shots(reduction: Reduction) -> Section:
         "shot",
     )
     lead = "Shots with a phase, by ranger. Every correction to each range is in ranges.csv."
-    return Section("shots", "Ranges", [Text(lead), TableBlock("shots", table, folded="Ranges")])
+    return ReportSection("shots", "Ranges", [Text(lead), TableBlock("shots", table, folded="Ranges")])
 
 
-def _provenance(reduction: Reduction, when: datetime) -> Section:
+def _provenance(reduction: Reduction, when: datetime) -> ReportSection:
     campaign = reduction.campaign
     settings = {
         key: f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,7 +1,17 @@
 """Poses of the dish by each command, as a table of the report."""
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.writers.report import Block, Heading, Items, Table, TableBlock, Text, number, text, uncertainty
+from catseye.gateways.writers.report import (
+    Block,
+    Heading,
+    Items,
+    ReportTable,
+    TableBlock,
+    Text,
+    number,
+    text,
+    uncertainty,
+)
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.pose.dish_ways import dish_ways
 
@@ -42,5 +52,5 @@ def dish_estimates(reduction: Reduction) -> list[Block]:
             "their uncertainties."
         ),
         Items([f"{way.command}: {way.fitted}" for way in ways]),
-        TableBlock("dish-pose", Table.of_rows(rows, text("component", "component"), *columns)),
+        TableBlock("dish-pose", ReportTable.of_rows(rows, text("component", "component"), *columns)),
     ]

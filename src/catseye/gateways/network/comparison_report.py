@@ -14,9 +14,9 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     Heading,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -27,7 +27,7 @@ from catseye.reduction.network.comparison import ComparedEpochs
 from catseye.reduction.network.words import quantity
 
 
-def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[str, str]) -> Report:
+def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
     """Report of two epochs.
 
     compared   two epochs
@@ -37,7 +37,7 @@ def comparison_report(compared: ComparedEpochs, when: datetime, inputs: Mapping[
     first, second = (epoch.network.source or word for epoch, word in ((compared.first, "A"), (compared.second, "B")))
     d = compared.deformation
     settings = {"level of the tests": f"{d.level:g}", "power": f"{d.power:g}", "datums may differ by": d.datum}
-    return Report(
+    return ResultReport(
         title=f"{second} against {first}: deformation",
         subtitle=(
             f"{len(d.names)} common points, compared by catseye on {when:%Y-%m-%d %H:%M} UTC; displacements are the "
@@ -92,12 +92,12 @@ def _status(compared: ComparedEpochs) -> str:
     )
 
 
-def _displacements(compared: ComparedEpochs) -> Section:
+def _displacements(compared: ComparedEpochs) -> ReportSection:
     d, axes = compared.deformation, compared.first.network.axis_names
     order = np.argsort(np.nan_to_num(d.p, nan=2.0), kind="stable")
     shift, u, plain = (v[order] / MILLIMETRE for v in (compared.displacement, compared.u, compared.difference[0]))
     keys = [(k, "xyz"[k], name) for k, name in enumerate(axes)]
-    table = Table(
+    table = ReportTable(
         (
             text("point", "point", [d.names[i] for i in order]),
             text("verdict", "verdict", [compared.verdicts[i] for i in order]),
@@ -120,10 +120,10 @@ def _displacements(compared: ComparedEpochs) -> Section:
     )
     scene = displacement_view(compared, lengthening(compared))
     blocks = [scene, displacement_chart(compared), Text(lead), TableBlock("displacements", table)]
-    return Section("displacements", "Displacements", blocks)
+    return ReportSection("displacements", "Displacements", blocks)
 
 
-def _epochs(compared: ComparedEpochs) -> Section:
+def _epochs(compared: ComparedEpochs) -> ReportSection:
     blocks: list[Block] = []
     for k, (title, epoch) in enumerate((("First epoch", compared.first), ("Second epoch", compared.second)), start=1):
         heads = (text("quantity", "quantity"), text("value", "value"), text("remark", "remark"))
@@ -131,6 +131,6 @@ def _epochs(compared: ComparedEpochs) -> Section:
             Heading(f"{title}: {epoch.network.source}"),
             Text(epoch.verdict.text),
             Text(f"Datum: {epoch.solution.datum}."),
-            TableBlock(f"epoch-{k}", Table.of_rows(network_cards(epoch), *heads)),
+            TableBlock(f"epoch-{k}", ReportTable.of_rows(network_cards(epoch), *heads)),
         ]
-    return Section("epochs", "Epochs", blocks)
+    return ReportSection("epochs", "Epochs", blocks)

@@ -22,9 +22,9 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     Heading,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -167,7 +167,7 @@ def scatter_words(s: MonteCarloScatter) -> str:
     return text
 
 
-def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, str]) -> Report:
+def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
     """Report of a planned network."""
     predicted, plan = planned.predicted, planned.plan
     name = predicted.network.source or "network"
@@ -179,7 +179,7 @@ def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, st
         schedule = _ranges("schedule", planned.picked, scheduled=True)
         following += [Heading("Schedule in the given time"), schedule]
     words = "" if planned.scatter is None else scatter_words(planned.scatter)
-    return Report(
+    return ResultReport(
         title=f"{name}: plan of a network",
         subtitle=(
             f"{len(predicted.table)} observations of {len(predicted.names)} points, predicted by catseye on "
@@ -189,9 +189,9 @@ def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, st
         cards=_cards(planned),
         passages=plan_passages(planned),
         sections=[
-            Section("network", "Network", [network_view(predicted, predicted=True), redundancy_chart(predicted)]),
-            Section("weakest", "Weakest points", [TableBlock("weakest", _weakest(planned))]),
-            Section(
+            ReportSection("network", "Network", [network_view(predicted, predicted=True), redundancy_chart(predicted)]),
+            ReportSection("weakest", "Weakest points", [TableBlock("weakest", _weakest(planned))]),
+            ReportSection(
                 "next",
                 "Next observations",
                 [
@@ -202,7 +202,7 @@ def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, st
                     *following,
                 ],
             ),
-            Section(
+            ReportSection(
                 "observations",
                 "Worth of each observation",
                 [
@@ -210,7 +210,9 @@ def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, st
                     TableBlock("worth", _worth(planned)),
                 ],
             ),
-            Section("monte-carlo", "Monte Carlo", [Text(words[:1].upper() + words[1:] if words else "Not requested.")]),
+            ReportSection(
+                "monte-carlo", "Monte Carlo", [Text(words[:1].upper() + words[1:] if words else "Not requested.")]
+            ),
             provenance_section(when, inputs, settings),
         ],
         label=f"catseye plan: {name}",
@@ -231,9 +233,9 @@ def _cards(planned: PlannedNetwork) -> list[Card]:
     ]
 
 
-def _weakest(planned: PlannedNetwork) -> Table:
+def _weakest(planned: PlannedNetwork) -> ReportTable:
     predicted, rows = planned.predicted, planned.weakest
-    return Table(
+    return ReportTable(
         (
             text("point", "point", [predicted.names[i] for i in rows]),
             uncertainty("u", "longest axis", planned.plan.weakest[rows] / MILLIMETRE, "mm", 4),
@@ -243,7 +245,7 @@ def _weakest(planned: PlannedNetwork) -> Table:
     )
 
 
-def _worth(planned: PlannedNetwork) -> Table:
+def _worth(planned: PlannedNetwork) -> ReportTable:
     """Table of the observations' worth, the largest first."""
     table = planned.predicted.table
     order = np.argsort(-planned.worth, kind="stable")[:MOST_OBSERVATIONS]
@@ -251,7 +253,7 @@ def _worth(planned: PlannedNetwork) -> Table:
     detectable = [
         quantity(table.mdb[k], str(table.unit[k])) if np.isfinite(table.mdb[k]) else "never" for k in order.tolist()
     ]
-    return Table(
+    return ReportTable(
         (
             text("observation", "observation", [planned.predicted.label(int(k)) for k in order]),
             number("worth", "worth", np.where(needed, np.nan, planned.worth[order] * 1e6), "µm", 4),
@@ -273,8 +275,8 @@ def _ranges(key: str, rows: tuple[Candidate, ...], *, scheduled: bool = False) -
         number("at", "done at", unit="s"),
     )
     lines = [(c.from_, c.to, c.u / MILLIMETRE, c.mean_u / MILLIMETRE, c.gain * 1e6, c.at_s) for c in rows]
-    table = Table.of_rows(lines, *heads)
-    return TableBlock(key, table if scheduled else Table(table.columns[:-1]))
+    table = ReportTable.of_rows(lines, *heads)
+    return TableBlock(key, table if scheduled else ReportTable(table.columns[:-1]))
 
 
 def write_plan(

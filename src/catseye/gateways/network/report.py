@@ -12,9 +12,9 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     Heading,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -36,7 +36,7 @@ def network_report(
     inputs: Mapping[str, str],
     *,
     prefix: str = "",
-) -> Report:
+) -> ResultReport:
     """Report of an adjusted network.
 
     adjusted   network
@@ -47,7 +47,7 @@ def network_report(
     name = adjusted.network.source or "network"
     axes = ", ".join(adjusted.network.axis_names)
     settings = {"level of the tests": f"{adjusted.level:g}", "variance factor applied": str(adjusted.scaled)}
-    return Report(
+    return ResultReport(
         title=f"{name}: network adjustment",
         subtitle=(
             f"{len(adjusted.table)} observations of {len(adjusted.names)} points, adjusted by catseye on "
@@ -59,7 +59,7 @@ def network_report(
         passages=[*passages(adjusted), *treatment_passages(adjusted)],
         sections=[
             _description(adjusted),
-            Section("network", "Network", [network_view(adjusted)]),
+            ReportSection("network", "Network", [network_view(adjusted)]),
             _observations(adjusted, f"{prefix}observations.csv"),
             _reliability(adjusted),
             _points(adjusted, f"{prefix}coordinates.csv"),
@@ -80,12 +80,12 @@ def _cards(adjusted: AdjustedNetwork) -> list[Card]:
     return cards
 
 
-def _description(adjusted: AdjustedNetwork) -> Section | None:
+def _description(adjusted: AdjustedNetwork) -> ReportSection | None:
     """Description in the file; None without one."""
     words = adjusted.network.description.strip()
     if not words:
         return None
-    return Section("description", "Description in the file", [Text(part) for part in words.split("\n\n")])
+    return ReportSection("description", "Description in the file", [Text(part) for part in words.split("\n\n")])
 
 
 def network_cards(adjusted: AdjustedNetwork) -> list[Card]:
@@ -113,7 +113,7 @@ def network_cards(adjusted: AdjustedNetwork) -> list[Card]:
     ]
 
 
-def _observations(adjusted: AdjustedNetwork, file: str) -> Section:
+def _observations(adjusted: AdjustedNetwork, file: str) -> ReportSection:
     rows = adjusted.table.worst_first[:MOST_OBSERVATIONS]
     total = len(adjusted.table)
     note = (
@@ -125,10 +125,10 @@ def _observations(adjusted: AdjustedNetwork, file: str) -> Section:
     )
     table = observation_table(adjusted, rows)
     blocks: list[Block] = [*residual_charts(adjusted), Text(lead), TableBlock("observations", table)]
-    return Section("observations", "Observations", blocks)
+    return ReportSection("observations", "Observations", blocks)
 
 
-def observation_table(adjusted: AdjustedNetwork, rows: Sequence[int] | np.ndarray) -> Table:
+def observation_table(adjusted: AdjustedNetwork, rows: Sequence[int] | np.ndarray) -> ReportTable:
     """Table of observations; lengths in mm, angles in arc seconds.
 
     adjusted   network
@@ -143,7 +143,7 @@ def observation_table(adjusted: AdjustedNetwork, rows: Sequence[int] | np.ndarra
     if adjusted.answered:
         remark = np.where(t.active[rows] & ~t.checked[rows], "unchecked", remark)
     sizes = np.array(scale, dtype=float)
-    return Table(
+    return ReportTable(
         (
             text("observation", "observation", [adjusted.label(int(k)) for k in rows]),
             number("residual", "residual", t.residual[rows] / sizes, u="u"),
@@ -160,9 +160,9 @@ def observation_table(adjusted: AdjustedNetwork, rows: Sequence[int] | np.ndarra
     )
 
 
-def _reliability(adjusted: AdjustedNetwork) -> Section:
+def _reliability(adjusted: AdjustedNetwork) -> ReportSection:
     if not adjusted.answered:
-        return Section("reliability", "Reliability", [Text("Unknown without a solution.")])
+        return ReportSection("reliability", "Reliability", [Text("Unknown without a solution.")])
     rows = np.flatnonzero(adjusted.table.active & ~adjusted.table.checked)
     blocks: list[Block | None] = [redundancy_chart(adjusted)]
     if not len(rows):
@@ -172,10 +172,10 @@ def _reliability(adjusted: AdjustedNetwork) -> Section:
         lead = f"{len(rows)} observations are not checked by others; an error in one of them would not show{more}."
         table = observation_table(adjusted, rows[:MOST_OBSERVATIONS])
         blocks += [Text(lead), TableBlock("unchecked", table)]
-    return Section("reliability", "Reliability", blocks)
+    return ReportSection("reliability", "Reliability", blocks)
 
 
-def _points(adjusted: AdjustedNetwork, file: str) -> Section:
+def _points(adjusted: AdjustedNetwork, file: str) -> ReportSection:
     count = len(adjusted.names)
     rows, note = np.arange(count), ""
     if count > MOST_POINTS:
@@ -186,7 +186,7 @@ def _points(adjusted: AdjustedNetwork, file: str) -> Section:
     roles = np.where(points.datum.any(axis=1), "datum", "")
     roles = np.where(points.fixed.any(axis=1), np.where(points.free.any(axis=1), "partly held", "held"), roles)
     u, axis = adjusted.u[rows] / MILLIMETRE, adjusted.ellipsoid.semi_axes[rows] / MILLIMETRE
-    table = Table(
+    table = ReportTable(
         (
             text("point", "point", [adjusted.names[i] for i in rows]),
             text("kind", "kind", np.where(adjusted.stations[rows], "station", "target")),
@@ -205,7 +205,7 @@ def _points(adjusted: AdjustedNetwork, file: str) -> Section:
         f"{note}Semi-axes are those of the standard ellipsoid (1σ), “seen” is the number of observations. "
         f"Covariances are in {file}."
     )
-    return Section("points", "Points", [Text(lead), TableBlock("points", table), *_relative(adjusted)])
+    return ReportSection("points", "Points", [Text(lead), TableBlock("points", table), *_relative(adjusted)])
 
 
 def _relative(adjusted: AdjustedNetwork) -> list[Block]:
@@ -221,7 +221,7 @@ def _relative(adjusted: AdjustedNetwork) -> list[Block]:
         )
         for r in adjusted.relative
     ]
-    table = Table.of_rows(
+    table = ReportTable.of_rows(
         rows,
         text("pair", "pair"),
         number("distance", "distance", unit="m", digits=5),
@@ -234,7 +234,7 @@ def _relative(adjusted: AdjustedNetwork) -> list[Block]:
     return [Heading("Relative positions"), TableBlock("relative", table)]
 
 
-def _datum(adjusted: AdjustedNetwork) -> Section:
+def _datum(adjusted: AdjustedNetwork) -> ReportSection:
     solution, parameters = adjusted.solution, adjusted.network.parameters
     lead = f"Datum: {solution.datum}. {solution.iterations} iterations. Status: {solution.status}."
     blocks: list[Block] = [Text(lead)]
@@ -253,8 +253,8 @@ def _datum(adjusted: AdjustedNetwork) -> Section:
             text("unit_of_u", "unit of u"),
             text("prior", "prior"),
         )
-        blocks.append(TableBlock("parameters", Table.of_rows(rows, *heads)))
-    return Section("datum", "Datum and parameters", blocks)
+        blocks.append(TableBlock("parameters", ReportTable.of_rows(rows, *heads)))
+    return ReportSection("datum", "Datum and parameters", blocks)
 
 
 def _scaled(value: float, u: float, unit: str) -> tuple[float, str, float, str]:
@@ -287,7 +287,7 @@ def _prior(start: float, sigma: float, unit: str) -> str:
     return f"{value}, u {u}" if sigma > 0.0 else f"held at {value}"
 
 
-def provenance_section(when: datetime, inputs: Mapping[str, str], settings: Mapping[str, str]) -> Section:
+def provenance_section(when: datetime, inputs: Mapping[str, str], settings: Mapping[str, str]) -> ReportSection:
     """Input files, programs and settings.
 
     when       UTC

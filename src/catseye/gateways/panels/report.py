@@ -31,9 +31,9 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     Heading,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -84,19 +84,19 @@ def _as_left_csv(work: "PanelWork") -> str:
     return readings_csv(work.left)
 
 
-def panels_report(work: "PanelWork", when: datetime) -> Report:
+def panels_report(work: "PanelWork", when: datetime) -> ResultReport:
     """Report of panel setting; `when` is UTC."""
-    return Report(
+    return ResultReport(
         title="Panel setting",
         subtitle=(f"{work.sheet.name}, reduced by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ"),
         verdict=work.verdict,
         cards=_cards(work),
         passages=passages(work),
         sections=[
-            Section("result", "Result", [*corner_charts(work), *surface_charts(work.latest)]),
-            Section("screws", "Screws", _screws(work)),
-            Section("crew", "Crew", [*turning_charts(work), *control_charts(work), *_crew(work)]),
-            Section("doubts", "Doubtful readings", _doubts(work)),
+            ReportSection("result", "Result", [*corner_charts(work), *surface_charts(work.latest)]),
+            ReportSection("screws", "Screws", _screws(work)),
+            ReportSection("crew", "Crew", [*turning_charts(work), *control_charts(work), *_crew(work)]),
+            ReportSection("doubts", "Doubtful readings", _doubts(work)),
             origin_section(when, work.inputs),
         ],
         label="catseye: panel setting",
@@ -123,7 +123,7 @@ def _screws(work: "PanelWork") -> list[Block]:
     rows = sorted((s for s in screws(work.latest) if s.verdict == "turn"), key=lambda s: -abs(s.turns))
     if not rows:
         return [Text("No screw needs a turn.")]
-    table = Table(
+    table = ReportTable(
         (
             text("corner", "corner", [s.corner for s in rows]),
             text("panel", "panel", [s.panel for s in rows]),
@@ -151,10 +151,10 @@ def _crew(work: "PanelWork") -> list[Block]:
     return blocks
 
 
-def _readers(readers: list["Reader"], kind: str) -> Table:
+def _readers(readers: list["Reader"], kind: str) -> ReportTable:
     closure = [[v * 1e6 for v in r.closure] for r in readers]
     sides = max((len(c) for c in closure), default=0)
-    return Table(
+    return ReportTable(
         (
             text("name", kind, [r.name for r in readers]),
             number("readings", "readings", [r.readings for r in readers], digits=0),
@@ -176,6 +176,8 @@ def _doubts(work: "PanelWork") -> list[Block]:
     heads = (text("place", "place"), text("corner", "corner"), text("what", "what", kind="long"))
     for name, heights in _stages(work):
         if heights.doubts:
-            table = Table.of_rows([(d.where, d.corner, doubt_text(d)) for d in heights.doubts], *heads, name="corner")
+            table = ReportTable.of_rows(
+                [(d.where, d.corner, doubt_text(d)) for d in heights.doubts], *heads, name="corner"
+            )
             blocks += [Heading(name), TableBlock(f"doubts-{name.lower().replace(' ', '-')}", table)]
     return blocks or [Text("No reading is in significant contradiction to the others.")]

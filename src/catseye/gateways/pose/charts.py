@@ -9,9 +9,9 @@ from catseye.gateways.writers.report import (
     Chart,
     ChartBlock,
     Coloured,
+    ReportTable,
     Scene,
     SceneBlock,
-    Table,
     categories,
     number,
     text,
@@ -66,11 +66,11 @@ def pose_blocks(result: PoseFindings) -> list[Block]:
     ]
 
 
-def residual_table(result: PoseFindings) -> Table:
+def residual_table(result: PoseFindings) -> ReportTable:
     """Place, residual and w of each point."""
     pose, places = result.pose.pose, result.pose.places
     residual = pose.motion.residual / MILLIMETRE
-    return Table(
+    return ReportTable(
         (
             text("point", "point", pose.names),
             *(number(axis, axis, places[:, k], "m", 5) for k, axis in enumerate("xyz")),
@@ -120,11 +120,11 @@ def fit_charts(fit: PointingFit) -> list[ChartBlock]:
     return blocks
 
 
-def correlation_table(fit: PointingFit) -> Table:
+def correlation_table(fit: PointingFit) -> ReportTable:
     """Correlations of the terms."""
     terms = fit.series.terms
     columns = (number(f"r_{k + 1}", term, fit.correlation[:, k], digits=2) for k, term in enumerate(terms))
-    return Table((text("term", "term", terms), *columns))
+    return ReportTable((text("term", "term", terms), *columns))
 
 
 def track_charts(profile: TrackProfile, caption: str) -> list[ChartBlock]:

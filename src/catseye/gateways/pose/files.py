@@ -18,9 +18,9 @@ from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.report import (
     Block,
     Card,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -77,10 +77,10 @@ def write_pose(
     join_tables(directory, [POINTS], frame=pose.frame, pivot=pivot, tables={"POSE": six})
 
 
-def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> Report:
-    """Report of a pose."""
+def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
+    """Report of a pose; `when` is UTC."""
     group = result.pose
-    return Report(
+    return ResultReport(
         title=f"Pose of {group.group} in {group.epoch.campaign or 'an epoch'}, against {group.against}",
         subtitle=(
             f"fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; second = pivot + "
@@ -90,7 +90,7 @@ def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str])
         cards=_cards(group.pose),
         passages=[Passage(title, words) for title, words in pose_words(result)],
         sections=[
-            Section(
+            ReportSection(
                 "pose",
                 "Six degrees of freedom",
                 [
@@ -98,8 +98,10 @@ def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str])
                     Text("The full covariance is in pose.json; it transforms exactly to another pivot or frame."),
                 ],
             ),
-            Section("residuals", "Residuals", [*pose_blocks(result), TableBlock("residuals", residual_table(result))]),
-            None if result.beam is None else Section("pointing", "Beam and focus", _beam(result.beam)),
+            ReportSection(
+                "residuals", "Residuals", [*pose_blocks(result), TableBlock("residuals", residual_table(result))]
+            ),
+            None if result.beam is None else ReportSection("pointing", "Beam and focus", _beam(result.beam)),
             origin_section(when, inputs),
         ],
         label=f"catseye: pose of {group.group}",
@@ -112,8 +114,8 @@ def _six(pose: Pose) -> tuple[np.ndarray, np.ndarray, list[str]]:
     return np.concatenate([pose.translation, pose.rotation]) / scale, pose.u / scale, ["mm"] * 3 + ["″"] * 3
 
 
-def _components(names: Sequence[str], values: np.ndarray, u: np.ndarray, units: Sequence[str]) -> Table:
-    return Table(
+def _components(names: Sequence[str], values: np.ndarray, u: np.ndarray, units: Sequence[str]) -> ReportTable:
+    return ReportTable(
         (
             text("component", "component", names),
             number("value", "value", values, digits=3, u="u"),
@@ -136,7 +138,7 @@ def _cards(pose: Pose) -> list[Card]:
 def _beam(beam: PointingOffset) -> list[Block]:
     scale = np.array([ARCSECOND, ARCSECOND, MILLIMETRE])
     u = np.sqrt(np.maximum(np.diag(beam.covariance), 0.0))
-    terms = Table.of_rows(
+    terms = ReportTable.of_rows(
         [(name, *(np.asarray(part)[:3] / scale)) for name, part in beam.terms.items()],
         text("term", "term"),
         number("azimuth", "azimuth × cos E", unit="″", digits=3),

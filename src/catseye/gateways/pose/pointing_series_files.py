@@ -25,9 +25,9 @@ from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.report import (
     Card,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -90,11 +90,11 @@ def write_used_stars(result: PointingFindings, path: Path) -> None:
         pieces.append(star_offsets_text(selected))
 
 
-def fit_report(result: PointingFindings, when: datetime) -> Report:
+def fit_report(result: PointingFindings, when: datetime) -> ResultReport:
     """Report of a pointing fit."""
     fit = result.fit
     u = np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND
-    return Report(
+    return ResultReport(
         title=f"Pointing series from {result.observations.source}",
         subtitle=_subtitle(when),
         verdict=fit.verdict,
@@ -104,7 +104,7 @@ def fit_report(result: PointingFindings, when: datetime) -> Report:
         ],
         passages=[Passage(title, words) for title, words in fit_words(result)],
         sections=[
-            Section(
+            ReportSection(
                 "terms",
                 "Terms",
                 [
@@ -115,14 +115,14 @@ def fit_report(result: PointingFindings, when: datetime) -> Report:
                     TableBlock("correlations", correlation_table(fit)),
                 ],
             ),
-            Section("residuals", "Residuals", fit_charts(fit)),
+            ReportSection("residuals", "Residuals", fit_charts(fit)),
             origin_section(when, result.hashes),
         ],
         label="catseye: pointing",
     )
 
 
-def _terms(result: PointingFindings) -> Table:
+def _terms(result: PointingFindings) -> ReportTable:
     """Term, value and u, and the difference from the other series where compared."""
     fit, compared = result.fit, result.comparison
     columns = [
@@ -139,7 +139,7 @@ def _terms(result: PointingFindings) -> Table:
             number("difference", "minus the other", [apart[k] for k in rows], "″", 2, u="u_difference"),
             uncertainty("u_difference", "u of the difference", [u[k] for k in rows], "″", 2),
         ]
-    return Table(tuple(columns))
+    return ReportTable(tuple(columns))
 
 
 def _subtitle(when: datetime) -> str:
@@ -210,10 +210,10 @@ def _tilt_caption(profile: TrackProfile) -> str:
     return f"Rotation of the alidade about east and north; dashed: the mean, the axis's tilt.{without}"
 
 
-def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> Report:
+def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> ResultReport:
     """Report of a track profile."""
     names = profile.series.names
-    coefficients = Table(
+    coefficients = ReportTable(
         (
             text("coefficient", "coefficient", names),
             number("value", "value", profile.series.values / ARCSECOND, "″", 3, u="u"),
@@ -221,13 +221,13 @@ def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetim
         )
     )
     tilt, *residuals = track_charts(profile, _tilt_caption(profile))
-    return Report(
+    return ResultReport(
         title="Track and azimuth bearing",
         subtitle=_subtitle(when),
         verdict=profile.verdict,
         passages=[Passage(title, words) for title, words in track_words(profile)],
         sections=[
-            Section("tilt", "Tilt by azimuth", [tilt, TableBlock("coefficients", coefficients), *residuals]),
+            ReportSection("tilt", "Tilt by azimuth", [tilt, TableBlock("coefficients", coefficients), *residuals]),
             origin_section(when, hashes),
         ],
         label="catseye: track profile",

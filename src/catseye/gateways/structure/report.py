@@ -15,9 +15,9 @@ from catseye.gateways.writers.report import (
     Chart,
     ChartBlock,
     DrawingBlock,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     categories,
@@ -36,22 +36,24 @@ GRID = 61  # points of a model's curve
 MOST_RESIDUALS = 20_000  # drawn
 
 
-def structure_report(found: StructureFindings, when: datetime, inputs: Mapping[str, str]) -> Report:
+def structure_report(found: StructureFindings, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
     """Report of a structure's model.
 
     when     UTC
     inputs   SHA-256 of each input file, by name
     """
     series = found.fit.series
-    return Report(
+    return ResultReport(
         title=f"Structure: {series.group}",
         subtitle=f"fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; frame {series.frame}; u = standard uncertainty, 1σ",
         verdict=found.verdict,
         cards=_cards(found),
         passages=structure_passages(replace(found, predicted=None)),
         sections=[
-            Section("motion", "Motion of the group", [*_motion(found.fit), TableBlock("motion", _six(found.fit))]),
-            Section("residuals", "Residuals", _residuals(found.fit, found.check)),
+            ReportSection(
+                "motion", "Motion of the group", [*_motion(found.fit), TableBlock("motion", _six(found.fit))]
+            ),
+            ReportSection("residuals", "Residuals", _residuals(found.fit, found.check)),
             _prediction(found),
             origin_section(when, inputs),
         ],
@@ -98,7 +100,7 @@ def _motion(fit: StructureFit) -> list[Block]:
     return [Text(lead), *blocks]
 
 
-def _six(fit: StructureFit) -> Table:
+def _six(fit: StructureFit) -> ReportTable:
     six, q = fit.six_of()
     u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
     units = np.repeat([MILLIMETRE, ARCSECOND], 3)
@@ -111,7 +113,7 @@ def _six(fit: StructureFit) -> Table:
             uncertainty(f"u_{c + 1}", f"u {name}", u[c] / units[c], unit, 3),
         )
     ]
-    return Table((text("function", "function", fit.model.functions), *columns))
+    return ReportTable((text("function", "function", fit.model.functions), *columns))
 
 
 def _residuals(fit: StructureFit, check: LeaveOut | None) -> list[Block]:
@@ -144,7 +146,7 @@ def _residuals(fit: StructureFit, check: LeaveOut | None) -> list[Block]:
     return [*blocks, ChartBlock("left-out", Chart("histogram", x), caption)]
 
 
-def _prediction(found: StructureFindings) -> Section | None:
+def _prediction(found: StructureFindings) -> ReportSection | None:
     """Predicted points; None without a request."""
     predicted = found.predicted
     if predicted is None:
@@ -154,7 +156,7 @@ def _prediction(found: StructureFindings) -> Section | None:
         for k, e in enumerate(found.request.elevation_deg)
         for i, name in enumerate(predicted.names)
     ]
-    table = Table.of_rows(
+    table = ReportTable.of_rows(
         lines,
         number("elevation", "elevation", unit="°"),
         text("point", "point"),
@@ -163,10 +165,10 @@ def _prediction(found: StructureFindings) -> Section | None:
         name="point",
     )
     warned = [Text(words) for words in predicted.outside]
-    return Section("prediction", "Predicted points", [*warned, TableBlock("prediction", table)])
+    return ReportSection("prediction", "Predicted points", [*warned, TableBlock("prediction", table)])
 
 
-def vibration_report(vibration: Vibration, when: datetime, inputs: Mapping[str, str]) -> Report:
+def vibration_report(vibration: Vibration, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
     """Report of a vibration; arguments as for `structure_report`."""
     from catseye.gateways.structure.figures import spectrum_figure  # matplotlib is heavy
     from catseye.gateways.writers.drawing import svg
@@ -177,20 +179,20 @@ def vibration_report(vibration: Vibration, when: datetime, inputs: Mapping[str, 
         "One-sided density of each range; the band is the 95 % interval of the first one's density. Red: half "
         "the rate. A question mark: it may be an alias.",
     )
-    return Report(
+    return ResultReport(
         title="Vibration",
         subtitle=f"by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ",
         verdict=vibration.verdict,
         passages=vibration_passages(vibration),
         sections=[
-            Section("spectra", "Spectra", [drawing, TableBlock("peaks", _peaks(vibration))]),
-            Section("modes", "Modes", [TableBlock("modes", _modes(vibration))]),
+            ReportSection("spectra", "Spectra", [drawing, TableBlock("peaks", _peaks(vibration))]),
+            ReportSection("modes", "Modes", [TableBlock("modes", _modes(vibration))]),
             origin_section(when, inputs),
         ],
     )
 
 
-def _peaks(vibration: Vibration) -> Table:
+def _peaks(vibration: Vibration) -> ReportTable:
     names = [s.name for s in vibration.series]
     rows = [
         (
@@ -204,7 +206,7 @@ def _peaks(vibration: Vibration) -> Table:
         )
         for p in vibration.peaks
     ]
-    return Table.of_rows(
+    return ReportTable.of_rows(
         rows,
         number("observed", "observed", unit="Hz", digits=3),
         number("true", "true", unit="Hz", digits=3),
@@ -216,7 +218,7 @@ def _peaks(vibration: Vibration) -> Table:
     )
 
 
-def _modes(vibration: Vibration) -> Table:
+def _modes(vibration: Vibration) -> ReportTable:
     rows = [
         (
             m.frequency_hz,
@@ -227,7 +229,7 @@ def _modes(vibration: Vibration) -> Table:
         )
         for m in vibration.modes
     ]
-    return Table.of_rows(
+    return ReportTable.of_rows(
         rows,
         number("frequency", "frequency", unit="Hz", digits=4, u="u_frequency"),
         uncertainty("u_frequency", "u", unit="Hz", digits=4),

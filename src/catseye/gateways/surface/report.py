@@ -18,9 +18,9 @@ from catseye.gateways.writers.report import (
     Block,
     Card,
     ChartBlock,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -37,7 +37,7 @@ from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, MeanSquare, ShapeSettings, SurfaceShape
 
 
-def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> Report:
+def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
     """Report of a surface.
 
     when     UTC
@@ -45,7 +45,7 @@ def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str,
     """
     names = ", ".join(shape.prisms.source for shape in result.shapes)
     single = result.shapes[0] if len(result.shapes) == 1 else None
-    return Report(
+    return ResultReport(
         title="The surface",
         subtitle=(
             f"{names}; by catseye on {when:%Y-%m-%d %H:%M} UTC; deviations along the normal, positive towards the "
@@ -79,10 +79,10 @@ def _cards(shape: SurfaceShape) -> list[Card]:
 
 def _quantities(key: str, cards: list[Card]) -> TableBlock:
     heads = (text("quantity", "quantity"), text("value", "value"), text("remark", "remark"))
-    return TableBlock(key, Table.of_rows(cards, *heads))
+    return TableBlock(key, ReportTable.of_rows(cards, *heads))
 
 
-def _shape(shape: SurfaceShape, epoch: int, single: bool) -> Section:
+def _shape(shape: SurfaceShape, epoch: int, single: bool) -> ReportSection:
     u = float(np.median(np.sqrt(np.diag(shape.fit.deviation_covariance)))) / MILLIMETRE
     key = f"epoch-{epoch}"
     lead: list[Block] = [
@@ -90,7 +90,7 @@ def _shape(shape: SurfaceShape, epoch: int, single: bool) -> Section:
         TableBlock(f"{key}-results", sentences(shape_passages(shape))),
     ]
     caption = f"Half-path errors from the fitted paraboloid, u of a deviation {u:.3f} mm (median). Line: the aperture."
-    return Section(
+    return ReportSection(
         key,
         "The dish" if single else f"Epoch {epoch}: {shape.prisms.source}",
         [
@@ -102,10 +102,10 @@ def _shape(shape: SurfaceShape, epoch: int, single: bool) -> Section:
     )
 
 
-def _prisms(shape: SurfaceShape) -> Table:
+def _prisms(shape: SurfaceShape) -> ReportTable:
     fit = shape.fit
     u = np.sqrt(np.diag(fit.deviation_covariance)) / MILLIMETRE
-    return Table(
+    return ReportTable(
         (
             text("point", "prism", shape.prisms.names),
             *(number(f"{a}_dish", f"{a} in the dish's frame", fit.local[:, k], "m", 5) for k, a in enumerate("xyz")),
@@ -117,9 +117,9 @@ def _prisms(shape: SurfaceShape) -> Table:
     )
 
 
-def _change(change: Change) -> Section:
+def _change(change: Change) -> ReportSection:
     caption = "Second epoch minus first, after removing the dish's motion, fitted in all three coordinates."
-    return Section(
+    return ReportSection(
         "change",
         "The change",
         [
@@ -134,7 +134,7 @@ def _change(change: Change) -> Section:
 def _terms(key: str, expansion: Expansion, settings: ShapeSettings) -> list[Block]:
     u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
     known = np.isfinite(u_joint)
-    table = Table(
+    table = ReportTable(
         (
             number(
                 "number", settings.numbering, [zernike_number(t, settings.numbering) for t in expansion.terms], digits=0
@@ -160,7 +160,7 @@ def _terms(key: str, expansion: Expansion, settings: ShapeSettings) -> list[Bloc
     ]
 
 
-def _lookup(lookup: Lookup) -> Section:
+def _lookup(lookup: Lookup) -> ReportSection:
     numbering, models = lookup.shapes[0].settings.numbering, lookup.models
     u = [model.raised * np.sqrt(np.diag(model.covariance)) / MILLIMETRE for model in models]
     coefficients = [
@@ -171,7 +171,7 @@ def _lookup(lookup: Lookup) -> Section:
             uncertainty(f"u_{k + 1}", f"u {name}", [v[k] for v in u], "mm", 4),
         )
     ]
-    table = Table(
+    table = ReportTable(
         (
             number("number", "term", [zernike_number(m.term, numbering) for m in models], digits=0),
             text("term", "name", [m.term.name for m in models]),
@@ -180,7 +180,7 @@ def _lookup(lookup: Lookup) -> Section:
         ),
         "term",
     )
-    return Section(
+    return ReportSection(
         "elevation",
         "Terms by elevation",
         [
@@ -196,8 +196,8 @@ def _lookup(lookup: Lookup) -> Section:
     )
 
 
-def _actuators(actuators: Actuators, shape: SurfaceShape) -> Section:
-    return Section(
+def _actuators(actuators: Actuators, shape: SurfaceShape) -> ReportSection:
+    return ReportSection(
         "actuators",
         "Actuators",
         [

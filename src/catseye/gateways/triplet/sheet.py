@@ -13,9 +13,9 @@ from catseye.gateways.writers.report import (
     Card,
     Chart,
     ChartBlock,
-    Report,
-    Section,
-    Table,
+    ReportSection,
+    ReportTable,
+    ResultReport,
     TableBlock,
     Text,
     number,
@@ -151,7 +151,7 @@ def _text_rows(symbols: Sequence[Symbol], reduction: TripletReduction, rows: sli
         yield f"{symbol.label:<14}{symbol.unit:<5}{cells}  {symbol.meaning}"
 
 
-def triplet_report(reduction: TripletReduction, file: str, when: datetime, digest: str) -> Report:
+def triplet_report(reduction: TripletReduction, file: str, when: datetime, digest: str) -> ResultReport:
     """Report of a triplet's calibration.
 
     reduction   the calibration of a unit
@@ -159,7 +159,7 @@ def triplet_report(reduction: TripletReduction, file: str, when: datetime, diges
     when        UTC, of the computation
     """
     m = reduction.measurement
-    return Report(
+    return ResultReport(
         title=f"{TITLE}: {m.triplet}",
         subtitle=(
             f"prisms {m.left_prism.serial} (left) and {m.right_prism.serial} (right); measured on {m.measured_on} by "
@@ -169,11 +169,13 @@ def triplet_report(reduction: TripletReduction, file: str, when: datetime, diges
         cards=_cards(reduction),
         passages=[Passage(title, words) for title, words in results(reduction)],
         sections=[
-            Section("placements", "Placements", [_placements_chart(reduction), *_budget(reduction)]),
-            Section("unit", "Unit", [TableBlock("unit", _table(UNIT, reduction))]),
-            Section("plate", "Surface plate", [TableBlock("plate", _table(PLATE, reduction)), *_paint(reduction)]),
-            Section("ranges", "Ranges", [TableBlock("ranges", _placement_table(reduction))]),
-            Section("points", "Points", [TableBlock("points", _points(reduction))]),
+            ReportSection("placements", "Placements", [_placements_chart(reduction), *_budget(reduction)]),
+            ReportSection("unit", "Unit", [TableBlock("unit", _table(UNIT, reduction))]),
+            ReportSection(
+                "plate", "Surface plate", [TableBlock("plate", _table(PLATE, reduction)), *_paint(reduction)]
+            ),
+            ReportSection("ranges", "Ranges", [TableBlock("ranges", _placement_table(reduction))]),
+            ReportSection("points", "Points", [TableBlock("points", _points(reduction))]),
             origin_section(when, {file: digest}),
         ],
     )
@@ -220,9 +222,9 @@ def _budget(reduction: TripletReduction) -> list[Block]:
     return [ChartBlock("budget", chart, "Budget: shares in u of H_corr.")]
 
 
-def _symbols(rows: Sequence[Sequence[str]], values: Sequence[str]) -> Table:
+def _symbols(rows: Sequence[Sequence[str]], values: Sequence[str]) -> ReportTable:
     """Table of symbols; the values have as many decimals as each symbol's unit asks for."""
-    return Table.of_rows(
+    return ReportTable.of_rows(
         rows,
         text("symbol", "symbol"),
         text("description", "description", kind="long"),
@@ -232,14 +234,14 @@ def _symbols(rows: Sequence[Sequence[str]], values: Sequence[str]) -> Table:
     )
 
 
-def _table(symbols: Sequence[Symbol], reduction: TripletReduction) -> Table:
+def _table(symbols: Sequence[Symbol], reduction: TripletReduction) -> ReportTable:
     rows = [
         (s.label, s.meaning, s.design or "–", cell(s, symbol_values(s, reduction)[0]), s.unit or "–") for s in symbols
     ]
     return _symbols(rows, ("value",))
 
 
-def _placement_table(reduction: TripletReduction) -> Table:
+def _placement_table(reduction: TripletReduction) -> ReportTable:
     every = range(len(reduction.h))
     spacers = (f"{placement.spacer_mm:.3f}" for placement in reduction.measurement.placement)
     rows: list[tuple[str, ...]] = [("spacer", "in front of the rear stops", "–", *spacers, "mm")]
@@ -262,7 +264,7 @@ def _signed(value: float) -> str:
 
 
 def _paint(reduction: TripletReduction) -> list[Block]:
-    table = Table.of_rows(
+    table = ReportTable.of_rows(
         [
             (name, low * 1e3, high * 1e3)
             for name, (low, high) in zip(("T₁", "T₂", "BC"), reduction.plate.departure, strict=True)
@@ -279,8 +281,8 @@ def _paint(reduction: TripletReduction) -> list[Block]:
     return [TableBlock("paint", table), Text(words)]
 
 
-def _points(reduction: TripletReduction) -> Table:
-    return Table.of_rows(
+def _points(reduction: TripletReduction) -> ReportTable:
+    return ReportTable.of_rows(
         [
             (name, POINTS[name], k, *(1e3 * x for x in place))
             for name, at in point_places(reduction).items()

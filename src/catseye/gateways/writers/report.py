@@ -35,7 +35,7 @@ class Card(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class ReportColumn:
     """Column of a report's table.
 
     key          name within the table
@@ -58,7 +58,7 @@ class Column:
     u: str = ""
 
     def to_object(self) -> dict[str, Any]:
-        """Column as JSON."""
+        """Column as an object of JSON."""
         number = self.kind == "number"
         digits = None if self.digits is None or self.significant else self.digits + SPARE
         values = rounded(self.values, digits, self.significant or USUAL) if number else _texts(self.values)
@@ -75,44 +75,46 @@ class Column:
 
 def number(
     key: str, label: str, values: Values = (), unit: str = "", digits: int | None = None, *, u: str = ""
-) -> Column:
-    """Column of numbers; arguments as for `Column`."""
-    return Column(key=key, label=label, values=values, unit=unit, kind="number", digits=digits, u=u)
+) -> ReportColumn:
+    """Column of numbers; arguments as for `ReportColumn`."""
+    return ReportColumn(key=key, label=label, values=values, unit=unit, kind="number", digits=digits, u=u)
 
 
-def uncertainty(key: str, label: str, values: Values = (), unit: str = "", digits: int | None = None) -> Column:
-    """Column of standard uncertainties, kept to four significant digits; arguments as for `Column`."""
-    return Column(key=key, label=label, values=values, unit=unit, kind="number", digits=digits, significant=SIGNIFICANT)
+def uncertainty(key: str, label: str, values: Values = (), unit: str = "", digits: int | None = None) -> ReportColumn:
+    """Column of standard uncertainties, kept to four significant digits; arguments as for `ReportColumn`."""
+    return ReportColumn(
+        key=key, label=label, values=values, unit=unit, kind="number", digits=digits, significant=SIGNIFICANT
+    )
 
 
-def text(key: str, label: str, values: Values = (), kind: ColumnKind = "text") -> Column:
-    """Column of texts; arguments as for `Column`."""
-    return Column(key=key, label=label, values=values, kind=kind)
+def text(key: str, label: str, values: Values = (), kind: ColumnKind = "text") -> ReportColumn:
+    """Column of texts; arguments as for `ReportColumn`."""
+    return ReportColumn(key=key, label=label, values=values, kind=kind)
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ReportTable:
     """Table of a report.
 
     columns   of equal lengths
     name      key of the column that names a thing of scenes and charts; "" for none
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[ReportColumn, ...]
     name: str = ""
 
     @classmethod
-    def of_rows(cls, rows: Iterable[Sequence[Any]], *heads: Column, name: str = "") -> "Table":
+    def of_rows(cls, rows: Iterable[Sequence[Any]], *heads: ReportColumn, name: str = "") -> "ReportTable":
         """Table whose columns, given without values, take theirs from rows.
 
-        >>> Table.of_rows([("A", 1.0), ("B", None)], text("point", "point"), number("x", "x")).columns[1].values
+        >>> ReportTable.of_rows([("A", 1.0), ("B", None)], text("point", "point"), number("x", "x")).columns[1].values
         (1.0, None)
         """
         columns = tuple(zip(*rows, strict=True)) or tuple(() for _ in heads)
         return cls(tuple(replace(h, values=v) for h, v in zip(heads, columns, strict=True)), name)
 
     def to_object(self) -> dict[str, Any]:
-        """Table as JSON; ValueError for columns of different lengths."""
+        """Table as an object of JSON; ValueError for columns of different lengths."""
         lengths = {column.key: len(column.values) for column in self.columns}
         if len(set(lengths.values())) > 1 or len(lengths) < len(self.columns):
             raise ValueError(f"columns of different lengths or of one key: {lengths}")
@@ -124,15 +126,15 @@ class Table:
 
 def pairs(
     rows: Mapping[str, str] | Iterable[tuple[str, str]], first: str, second: str, *, hashes: bool = False
-) -> Table:
+) -> ReportTable:
     """Table of names with a text or a digest each."""
     listed = list(rows.items()) if isinstance(rows, Mapping) else list(rows)
-    return Table.of_rows(listed, text("name", first), text("value", second, kind="hash" if hashes else "text"))
+    return ReportTable.of_rows(listed, text("name", first), text("value", second, kind="hash" if hashes else "text"))
 
 
-def sentences(passages: Iterable[tuple[str, str]], first: str = "on") -> Table:
+def sentences(passages: Iterable[tuple[str, str]], first: str = "on") -> ReportTable:
     """Table of passages, for those of a part of the report."""
-    return Table.of_rows(passages, text("title", first), text("text", "result", kind="long"))
+    return ReportTable.of_rows(passages, text("title", first), text("text", "result", kind="long"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +150,7 @@ class Coloured:
     digits: int | None = None
 
     def to_object(self) -> dict[str, Any]:
-        """Value as JSON."""
+        """Value as an object of JSON."""
         return {"label": self.label, "unit": self.unit, "values": rounded(self.values, self.digits)}
 
 
@@ -167,7 +169,7 @@ class Beams:
     names: Sequence[Any] = ()
 
     def to_object(self) -> dict[str, Any]:
-        """Beams as JSON."""
+        """Beams as an object of JSON."""
         return {
             "from": [int(row) for row in self.start],
             "to": [int(row) for row in self.end],
@@ -204,7 +206,7 @@ class Scene:
     value: Coloured | None = None
 
     def to_object(self) -> dict[str, Any]:
-        """Scene as JSON."""
+        """Scene as an object of JSON."""
         points: dict[str, Any] = {
             "name": _texts(self.names),
             **{axis: rounded(self.x[:, k], 7) for k, axis in enumerate("xyz")},
@@ -248,7 +250,7 @@ class Axis:
     digits: int | None = None
 
     def to_object(self) -> dict[str, Any]:
-        """Axis as JSON."""
+        """Axis as an object of JSON."""
         return {
             "label": self.label,
             "unit": self.unit,
@@ -288,7 +290,7 @@ class Chart:
     outline: Sequence[np.ndarray] = ()
 
     def to_object(self) -> dict[str, Any]:
-        """Chart as JSON."""
+        """Chart as an object of JSON."""
         ways = [{"x": rounded(way[:, 0], 4), "y": rounded(way[:, 1], 4)} for way in self.outline]
         return {
             "type": self.kind,
@@ -304,7 +306,7 @@ class Chart:
 
 
 class Text(NamedTuple):
-    """Paragraph."""
+    """Paragraph of a section, in words."""
 
     text: str
     faint: bool = False
@@ -317,7 +319,7 @@ class Heading(NamedTuple):
 
 
 class Items(NamedTuple):
-    """List of sentences."""
+    """List of sentences, marked."""
 
     items: Sequence[str]
 
@@ -326,7 +328,7 @@ class TableBlock(NamedTuple):
     """Table under a key of its own in the report; `folded` is the title of what opens."""
 
     key: str
-    table: Table
+    table: ReportTable
     caption: str = ""
     folded: str = ""
 
@@ -359,7 +361,7 @@ Block = Text | Heading | Items | TableBlock | SceneBlock | ChartBlock | DrawingB
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class ReportSection:
     """Part of a report; None among its blocks is left out.
 
     key   for links within the report
@@ -371,7 +373,7 @@ class Section:
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class ResultReport:
     """Report of a result.
 
     title      heading
@@ -386,7 +388,7 @@ class Report:
     title: str
     subtitle: str
     verdict: Verdict | None
-    sections: Sequence[Section | None]
+    sections: Sequence[ReportSection | None]
     cards: Sequence[Card] = ()
     passages: Sequence[Passage] = ()
     label: str = ""
@@ -394,7 +396,7 @@ class Report:
 
 def origin_section(
     when: datetime, inputs: Mapping[str, str], facts: Mapping[str, str] | None = None, *blocks: Block
-) -> Section:
+) -> ReportSection:
     """Section on the files read, the programs and the settings.
 
     when     UTC
@@ -404,10 +406,12 @@ def origin_section(
     """
     rows = {"made (UTC)": f"{when:%Y-%m-%d %H:%M:%S}", **versions(), **(facts or {})}
     files = TableBlock("inputs", pairs(inputs, "file read", "SHA-256", hashes=True), folded="Inputs and their SHA-256")
-    return Section("provenance", "Provenance", [*blocks, TableBlock("versions", pairs(rows, "item", "value")), files])
+    return ReportSection(
+        "provenance", "Provenance", [*blocks, TableBlock("versions", pairs(rows, "item", "value")), files]
+    )
 
 
-def report_object(report: Report) -> dict[str, Any]:
+def report_object(report: ResultReport) -> dict[str, Any]:
     """Report as JSON, docs/formats/results.md; ValueError for a key that occurs twice."""
     stores: dict[str, dict[str, Any]] = {"tables": {}, "scenes": {}, "charts": {}, "drawings": {}}
     sections = [

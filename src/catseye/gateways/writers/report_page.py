@@ -11,7 +11,7 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
-from catseye.gateways.writers.report import Card, Report, report_object
+from catseye.gateways.writers.report import Card, ResultReport, report_object
 from catseye.gateways.writers.verdict import verdict_line
 from catseye.records.files.report_file import DATA, SHARED
 from catseye.version import __version__
@@ -27,7 +27,7 @@ WITHOUT = (
 )
 
 
-def report_page(report: Report) -> str:
+def report_page(report: ResultReport) -> str:
     """HTML document of a report, without external resources; the same bytes for the same report."""
     data = _compact(_once(report_object(report)))
     packed = base64.b64encode(gzip.compress(data.encode("utf-8"), 9, mtime=0)).decode("ascii")
@@ -82,7 +82,7 @@ def _once(report: dict[str, Any]) -> dict[str, Any]:
     return {**replaced(report), SHARED: [json.loads(text) for text in places]}
 
 
-def _words(report: Report) -> Iterator[str]:
+def _words(report: ResultReport) -> Iterator[str]:
     """Heading, verdict, cards and passages, escaped."""
     yield f'<header><h1>{escape(report.title)}</h1><div class="faint">{escape(report.subtitle)}</div></header>'
     if report.verdict is not None:
