@@ -3,20 +3,20 @@ import type { Report } from "./lib/types";
 import { report } from "./parts/report";
 import "./report.css";
 
-/** Report with its repeated lists, which its data hold once, in their places. */
-function expanded(part: unknown, lists: unknown[]): unknown {
-  if (part === null || typeof part !== "object") return part;
-  if (Array.isArray(part)) return part.length && typeof part[0] === "object" ? part.map((item) => expanded(item, lists)) : part;
-  const keys = Object.keys(part);
-  if (keys.length === 1 && keys[0] === "shared") return lists[(part as { shared: number }).shared];
-  return Object.fromEntries(Object.entries(part).map(([key, item]) => [key, expanded(item, lists)]));
+/** Put repeated lists, which the data hold once, in their places. */
+function expand(part: object, lists: unknown[]): void {
+  for (const [key, item] of Object.entries(part)) {
+    if (Array.isArray(item) ? typeof item[0] !== "object" : typeof item !== "object" || !item) continue;
+    if (item.shared === undefined) expand(item, lists);
+    else (part as Record<string, unknown>)[key] = lists[item.shared];
+  }
 }
 
 async function unpacked(text: string): Promise<Report> {
   const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const { shared = [], ...packed } = (await new Response(stream).json()) as Report & { shared?: unknown[] };
-  const data = expanded(packed, shared) as Report;
+  const { shared = [], ...data } = (await new Response(stream).json()) as Report & { shared?: unknown[] };
+  expand(data, shared);
   if (data.format !== "catseye-report-1") throw `format ${data.format} is unknown`;
   return data;
 }
@@ -25,15 +25,14 @@ async function start(): Promise<void> {
   const host = document.getElementById("catseye-report");
   const source = document.getElementById("catseye-data");
   if (!host || !source) return;
-  host.textContent = "Loading the data of this report …";
+  host.textContent = "Loading …";
   try {
-    if (!("DecompressionStream" in window)) throw "it needs a browser from 2023 or later";
     const data = await unpacked(source.textContent ?? "");
     host.textContent = "";
     report(host, data);
-    if (location.hash.length > 1) document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
+    document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
   } catch (error) {
-    host.textContent = `The data of this report cannot be shown: ${String(error)}.`;
+    host.textContent = `This report's data cannot be shown; browsers from 2023 or later can. ${error}`;
     host.className = "bad";
     host.role = "alert";
   }

@@ -11,11 +11,16 @@ test("ticks are round, inside, and no more than asked for", () => {
   assert.equal(ticks(-0.12, 0.31, 6).digits, 1);
   for (let i = 1; i < 300; i++) {
     const low = Math.sin(i) * 10 ** (i % 7) - 3;
-    const high = low + 10 ** ((i % 23) - 11) * (1 + (i % 9));
+    const high = low + Math.max(10 ** ((i % 23) - 11), Math.abs(low) * 1e-9) * (1 + (i % 9));
     const { at, step } = ticks(low, high, 6);
     assert.ok(at.length <= 8 && at.every((v) => v >= low - 1e-6 * step && v <= high + 1e-6 * step));
     assert.ok([1, 2, 5, 10].some((f) => Math.abs(Math.log10(step / f) - Math.round(Math.log10(step / f))) < 1e-9));
   }
+});
+
+test("ticks end where numbers cannot be told apart", () => {
+  assert.ok(ticks(1e6, 1e6 + 1e-10, 6).at.length <= 50);
+  assert.deepEqual(ticks(NaN, NaN, 6).at, []);
 });
 
 test("axes have the prefix that reads best", () => {

@@ -1,25 +1,23 @@
 // Camera that turns about a point: matrix of view and projection, projection of points on the CPU.
-import { cos, floor, hypot, max, sin, tan } from "./maths";
+import { cos, hypot, max, sin, tan } from "./maths";
 export interface Camera { yaw: number; pitch: number; distance: number; target: [number, number, number] }
 
 const SIGHT = 0.42; // rad, whole vertical angle
 
 /** Column-major 4 x 4 matrix from the scene to clip space. z is up; yaw 0 looks along +y. */
 export function matrixOf(camera: Camera, aspect: number, extent: number): Float32Array {
+  const { target, distance } = camera;
   const { right, up, back } = axesOf(camera);
   const f = 1 / tan(SIGHT / 2);
-  const near = max(camera.distance - 2 * extent, camera.distance * 0.02);
-  const far = camera.distance + 2 * extent;
-  const rows = [
-    [...right.map((v) => (v * f) / aspect), 0], [...up.map((v) => v * f), 0],
-    [...back.map((v) => (v * (far + near)) / (near - far)), (2 * far * near) / (near - far)], [...back.map((v) => -v), 0],
-  ] as number[][];
-  const eye = camera.target.map((v, i) => v + back[i]! * camera.distance);
-  return Float32Array.from({ length: 16 }, (_, i) => {
-    const row = rows[i % 4]!;
-    const column = floor(i / 4);
-    return column < 3 ? row[column]! : row[3]! - (row[0]! * eye[0]! + row[1]! * eye[1]! + row[2]! * eye[2]!);
-  });
+  const near = max(distance - 2 * extent, distance * 0.02);
+  const far = distance + 2 * extent;
+  const k = (far + near) / (near - far);
+  const along = (axis: number[]) => axis[0]! * target[0] + axis[1]! * target[1] + axis[2]! * target[2];
+  const eye = along(back) + distance;
+  return new Float32Array([
+    ...[0, 1, 2].flatMap((i) => [(right[i]! * f) / aspect, up[i]! * f, back[i]! * k, -back[i]!]),
+    (-along(right) * f) / aspect, -along(up) * f, (2 * far * near) / (near - far) - k * eye, eye,
+  ]);
 }
 
 export function axesOf({ yaw, pitch }: Camera): { right: number[]; up: number[]; back: number[] } {

@@ -1,7 +1,7 @@
 // Chart on a canvas: marks with uncertainties, hover, keyboard, zoom, downloads, paper.
 import type { Axis, Chart, Column } from "../lib/types";
 import { instant, scale, type Scale } from "./axes";
-import { announce, button, context, el, extent, fill, paper, pixels, segment, set, stroke, surface, type Options, type Palette, type Part } from "./dom";
+import { announce, brief, button, context, el, extent, fill, paper, pixels, segment, set, stroke, surface, type Options, type Palette, type Part } from "./dom";
 import { csv, png } from "./download";
 import { marksOf, type Mark } from "./marks";
 import { fixed, plain, shown } from "./number";
@@ -11,7 +11,6 @@ import "./parts.css";
 const NEAR = 24; // px from the pointer within which a mark is hovered
 const CROWDED = 1500; // marks above which they are small squares without uncertainties; those come with the zoom
 const SHEET = 680; // px wide on paper
-const KINDS = { scatter: "Scatter plot", line: "Line chart", bars: "Bar chart", histogram: "Histogram", normal: "Normal probability plot", map: "Map" };
 type View = [x0: number, x1: number, y0: number, y1: number];
 
 // Outlines of the markers of groups: x, y in tenths of half the width; none: a circle.
@@ -26,14 +25,13 @@ function marker(g: CanvasRenderingContext2D, x: number, y: number, group: number
 
 export function chart(host: HTMLElement, data: Chart, options: Options = {}): Part<Chart> {
   const label = options.label ?? "Chart";
-  const self = surface(host, "chart", label, { paint, scheme() {}, raster: () => raster(SHEET, 2.5) });
+  const self = surface(host, "chart", label, { paint, raster: () => raster(SHEET, 2.5) });
   const { canvas, stage, dirty } = self;
-  const ring = el("div.ce-ring");
   const area = el("div.ce-area");
   const reset = button("Reset zoom", () => zoom(null));
-  self.bar.append(reset, button("PNG", () => png(label, raster(max(self.width(), 640), 2))), button("CSV", download));
+  self.bar.append(reset, button("PNG", () => png(label, raster(900, 2))), button("CSV", download));
   self.spoken.classList.add("ce-hidden");
-  stage.append(ring, area);
+  stage.append(area);
 
   // Kinds of charts, set by the data:
   let scatter: boolean, line: boolean, bars: boolean, histogram: boolean, normal: boolean, map: boolean, boxes: boolean, grouped: boolean, zooms: boolean;
@@ -109,9 +107,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     };
     if (grouped && !data.value) data.groups!.forEach((name, i) => entry(name, 12, (x) => fill(g, c.group(i), () => marker(g, x + 6, ly, i, 4.5))));
     if (data.value) {
-      const v = scale({ label: data.value.label, unit: data.value.unit }, -end, end);
-      const bound = plain(Number((end * v.factor).toPrecision(2)));
-      entry(`\u2212${bound} to +${bound}: ${v.title}`, 90, (x) => {
+      entry(`${data.value.label} ±${brief(end, data.value.unit)}`, 90, (x) => {
         for (let i = 0; i < 90; i++) fill(g, c.diverging(i / 44.5 - 1), () => g.rect(x + i, ly - 5, 1.5, 10));
       });
     }
@@ -121,18 +117,15 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     const yTicks = y.at(max(2, floor(h / 48)));
     const top = legend + 18;
     const left = min(ceil(longest(yTicks)) + 10, w * 0.4);
-    let right = w - 12;
+    // A map's frame has the shape of its area.
+    const right = map ? min(w - 12, left + ((h - 40 - top) * (x1 - x0)) / (y1 - y0)) : w - 12;
     const x = scale(axes.x, x0, x1);
     let xTicks = x.at(8);
-
     const slot = (right - left) / max(xTicks.length, 1);
     const tilted = !!axes.x.categories && longest(xTicks) + 8 > slot;
     if (!axes.x.categories) xTicks = x.at(max(2, floor((right - left) / (longest(xTicks) + 22))));
     const drop = tilted ? min(longest(xTicks), 110) * 0.72 + 14 : 20;
-    let bottom = h - drop - 20;
-    // A map's frame has the shape of its area.
-    const s = min((right - left) / (x1 - x0), (bottom - top) / (y1 - y0));
-    if (map) (right = left + s * (x1 - x0)), (bottom = top + s * (y1 - y0));
+    const bottom = map ? top + ((right - left) * (y1 - y0)) / (x1 - x0) : h - drop - 20;
     px = (v) => left + ((v - x0) / (x1 - x0)) * (right - left);
     py = (v) => bottom - ((v - y0) / (y1 - y0)) * (bottom - top);
     inner = { left, right, top, bottom };
@@ -152,10 +145,10 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     for (const t of xTicks) {
       const at = round(px(t.value)) + 0.5;
       if (at < left - 1 || at > right + 1) continue;
-      if (!axes.x.categories || scatter) segment(g, at, top, at, bottom);
-      const half = tilted ? 6.5 : wide(t.text) / 2 + 3;
+      const half = tilted ? 8 : wide(t.text) / 2 + 3;
       if (at - half < free) continue;
       free = at + half;
+      if (!axes.x.categories || scatter) segment(g, at, top, at, bottom);
       g.save();
       g.translate(at, bottom + 12);
       if (tilted) g.rotate(-0.8);
@@ -293,10 +286,8 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
 
   function point(i: number): void {
     const m = marks[i];
-    ring.hidden = !m;
-    const [x, y] = m ? place(m) : [0, 0];
-    ring.style.translate = `${x}px ${y}px`;
-    self.show(x, y, m ? lines(m) : []);
+    if (m) self.show(...place(m), lines(m));
+    else self.show(0, 0, []);
   }
 
   function zoom(next: View | null): void {
@@ -330,41 +321,36 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
 
   // Pointer: hover, click, drag to zoom.
   let from: [number, number] | null = null;
-  const span = (a: [number, number], b: [number, number]) => {
-    const [l, r] = [max(min(a[0], b[0]), inner.left), clamp(a[0], b[0], inner.right)];
-    const flat = abs(a[1] - b[1]) < 12; // along x alone
-    const [t, e] = flat ? [inner.top, inner.bottom] : [max(min(a[1], b[1]), inner.top), clamp(a[1], b[1], inner.bottom)];
-    return { l, r, t, e };
-  };
+  let drag: View | null = null; // px
   canvas.onpointerdown = (event) => {
     if (event.button) return;
     from = [event.offsetX, event.offsetY];
     if (zooms) canvas.setPointerCapture(event.pointerId);
   };
-  canvas.onpointermove = (event) => {
+  canvas.onpointermove = ({ offsetX: x, offsetY: y }) => {
     if (!px) return;
-    const to: [number, number] = [event.offsetX, event.offsetY];
-    if (from && zooms && abs(to[0] - from[0]) > 6) {
-      const { l, r, t, e } = span(from, to);
+    if (from && zooms && abs(x - from[0]) > 6) {
+      const { left, right, top, bottom } = inner;
+      const [x0, x1] = [from[0], x].map((v) => clamp(v, left, right)).sort((a, b) => a - b) as [number, number];
+      // A flat box zooms along x alone.
+      const [y0, y1] = (abs(y - from[1]) < 12 ? [top, bottom] : [from[1], y]).map((v) => clamp(v, top, bottom)).sort((a, b) => a - b) as [number, number];
+      drag = [x0, x1, y0, y1];
       area.hidden = false;
-      Object.assign(area.style, { left: `${l}px`, width: `${r - l}px`, top: `${t}px`, height: `${e - t}px` });
+      Object.assign(area.style, { translate: `${x0}px ${y0}px`, width: `${x1 - x0}px`, height: `${y1 - y0}px` });
       point(-1);
-    } else point((current = nearest(...to)));
+    } else point((current = nearest(x, y)));
   };
-  canvas.onpointerup = (event) => {
-    const to: [number, number] = [event.offsetX, event.offsetY];
-    if (!area.hidden && from) {
-      const { l, r, t, e } = span(from, to);
+  canvas.onpointerup = canvas.onpointercancel = ({ offsetX, offsetY, type }) => {
+    if (type === "pointerup" && drag) {
+      const { left, right, top, bottom } = inner;
       const [x0, x1, y0, y1] = view ?? bounds;
-      const [vx, vy] = [(p: number) => x0 + ((p - inner.left) / (inner.right - inner.left)) * (x1 - x0), (p: number) => y0 + ((inner.bottom - p) / (inner.bottom - inner.top)) * (y1 - y0)];
-      if (r - l > 6) zoom([vx(l), vx(r), vy(e), vy(t)]);
-    } else if (from) pick((current = nearest(...to)));
-    from = null;
+      const [vx, vy] = [(p: number) => x0 + ((p - left) / (right - left)) * (x1 - x0), (p: number) => y0 + ((bottom - p) / (bottom - top)) * (y1 - y0)];
+      zoom([vx(drag[0]), vx(drag[1]), vy(drag[3]), vy(drag[2])]);
+    } else if (type === "pointerup" && from) pick((current = nearest(offsetX, offsetY)));
+    from = drag = null;
     area.hidden = true;
   };
-  canvas.onpointercancel = () => ((from = null), (area.hidden = true));
   canvas.onpointerleave = () => !from && point(-1);
-  canvas.ondblclick = () => zoom(null);
   canvas.onblur = () => point(-1);
   canvas.onkeydown = (event) => {
     const moves: Record<string, number> = { ArrowRight: 1, ArrowLeft: -1, Home: -Infinity, End: Infinity };
@@ -393,7 +379,7 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
     measure();
     current = -1;
     stage.classList.toggle("ce-zooms", zooms);
-    set(canvas, { "aria-label": `${label}. ${KINDS[data.type]}: ${axes.y.label} against ${axes.x.label}, ${marks.length} marks. Left and right arrows move among them.` });
+    set(canvas, { "aria-label": `${label}. Chart (${data.type}): ${axes.y.label} against ${axes.x.label}, ${marks.length} marks. Left and right arrows move among them.` });
     point(-1);
     dirty();
   }

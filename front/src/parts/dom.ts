@@ -1,4 +1,5 @@
 // What the parts share: elements, tool tips, colours, printing, ticks.
+import { plain } from "./number";
 import { abs, ceil, floor, known, log10, max, min, round } from "./maths";
 export interface Options { select?: (name: string) => void; label?: string }
 export interface Part<T> { update(data: T): void; select(name: string | null): void; destroy(): void }
@@ -23,7 +24,7 @@ export function set(element: Element, attributes: Attributes): void {
 }
 
 export function button(text: string, click: () => void): HTMLButtonElement {
-  const element = el("button", { type: "button" }, text);
+  const element = el("button", {}, text);
   element.onclick = click;
   return element;
 }
@@ -40,13 +41,18 @@ type Colours = Record<(typeof KEYS)[number], string>;
 export type Palette = Colours & { group(i: number): string; diverging(t: number): string };
 
 let pixel: CanvasRenderingContext2D | null = null;
+const mixed = new Map<string, number[]>();
 
 /** Red, green, blue, 0 to 255, of any colour that CSS knows. */
 export function channels(colour: string): number[] {
-  pixel ??= el("canvas", { width: 1, height: 1 }).getContext("2d", { willReadFrequently: true })!;
-  pixel.fillStyle = colour;
-  pixel.fillRect(0, 0, 1, 1);
-  return [...pixel.getImageData(0, 0, 1, 1).data.slice(0, 3)];
+  let rgb = mixed.get(colour);
+  if (!rgb) {
+    pixel ??= el("canvas", { width: 1, height: 1 }).getContext("2d", { willReadFrequently: true })!;
+    pixel.fillStyle = colour;
+    pixel.fillRect(0, 0, 1, 1);
+    mixed.set(colour, (rgb = [...pixel.getImageData(0, 0, 1, 1).data.slice(0, 3)]));
+  }
+  return rgb;
 }
 
 /** Colours of the page at a host, as its variables say now. */
@@ -68,10 +74,11 @@ export function palette(host: HTMLElement): Palette {
 }
 
 let light: Palette | null = null;
+const root = globalThis.document?.documentElement;
 
 /** Colours on paper: those of the light scheme, on white. */
 export function paper(host: HTMLElement): Palette {
-  const { dataset } = document.documentElement;
+  const { dataset } = root;
   const before = dataset.theme;
   if (!light) {
     dataset.theme = "light";
@@ -107,20 +114,20 @@ export function onPrint(call: (printing: boolean) => void): () => void {
 export interface Surface {
   canvas: HTMLCanvasElement; // takes pointer and keys
   stage: HTMLElement;
-  width(): number;
   bar: HTMLElement;
   spoken: HTMLElement;
   colours: Palette;
-  show(x: number, y: number, lines: string[]): void; // tool tip; no lines: none
+  show(x: number, y: number, lines: string[]): void; // ring and tool tip; no lines: none
   dirty(): void;
   destroy(): void;
 }
 
-export function surface(host: HTMLElement, kind: "chart" | "scene", label: string, hooks: { paint(width: number, now: number): void; scheme(): void; raster(): HTMLCanvasElement }): Surface {
+export function surface(host: HTMLElement, kind: "chart" | "scene", label: string, hooks: { paint(width: number, now: number): void; scheme?(): void; raster(): HTMLCanvasElement }): Surface {
   const life = new AbortController();
   const canvas = el("canvas.ce-live", { tabindex: 0, role: "img" });
-  const tip = el("div.ce-tip", { "aria-hidden": "true" });
-  const stage = el("div.ce-stage", {}, canvas, tip);
+  const tip = el("div.ce-tip", { "aria-hidden": true });
+  const ring = el("div.ce-ring");
+  const stage = el("div.ce-stage", {}, canvas, ring, tip);
   const sheet = el("img.ce-sheet", { alt: label });
   const bar = el("div.ce-bar");
   const spoken = el("p.ce-said", { "aria-live": "polite" });
@@ -131,13 +138,14 @@ export function surface(host: HTMLElement, kind: "chart" | "scene", label: strin
     canvas, stage, bar, spoken,
     colours: palette(host),
     show(x, y, lines) {
-      tip.hidden = !lines.length;
+      tip.hidden = ring.hidden = !lines.length;
+      ring.style.translate = `${x}px ${y}px`;
       tip.replaceChildren(...lines.map((line, i) => el(i ? "span" : "b", {}, line)));
       const { offsetWidth: w, offsetHeight: h } = tip;
-      tip.style.left = `${max(0, x + 14 + w > stage.clientWidth ? x - w - 10 : x + 14)}px`;
-      tip.style.top = `${max(0, y + 14 + h > stage.clientHeight ? y - h - 8 : y + 14)}px`;
+      // Turned back where it would leave the picture.
+      const beside = (at: number, size: number, room: number) => max(0, at + 14 + size > room ? at - size - 10 : at + 14);
+      tip.style.translate = `${beside(x, w, stage.clientWidth)}px ${beside(y, h, stage.clientHeight)}px`;
     },
-    width: () => width,
     dirty() {
       frame ||= requestAnimationFrame((now) => {
         frame = 0;
@@ -154,18 +162,18 @@ export function surface(host: HTMLElement, kind: "chart" | "scene", label: strin
       box.remove();
     },
   };
-  tip.hidden = true;
+  self.show(0, 0, []);
   const change = () => {
     self.colours = palette(host);
-    hooks.scheme();
+    hooks.scheme?.();
     self.dirty();
   };
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", change, life);
-  let theme = document.documentElement.dataset.theme;
+  let { theme } = root.dataset;
   const scheme = new MutationObserver(() => {
-    if (theme !== (theme = document.documentElement.dataset.theme)) change();
+    if (theme !== (theme = root.dataset.theme)) change();
   });
-  scheme.observe(document.documentElement, { attributeFilter: ["data-theme"] });
+  scheme.observe(root, { attributeFilter: ["data-theme"] });
   const stop = onPrint((printing) => {
     if (printing) sheet.src = hooks.raster().toDataURL();
     else sheet.removeAttribute("src");
@@ -177,7 +185,7 @@ export function surface(host: HTMLElement, kind: "chart" | "scene", label: strin
   return self;
 }
 
-export const FONT = "12px system-ui, 'Segoe UI', Roboto, Arial, sans-serif";
+export const FONT = "12px system-ui, sans-serif";
 
 /** Size a canvas and clear it; its context in CSS pixels. */
 export function context(canvas: HTMLCanvasElement, width: number, height: number, ratio: number, ground?: string): CanvasRenderingContext2D {
@@ -219,7 +227,8 @@ export function ticks(low: number, high: number, most: number): { at: number[]; 
   const power = floor(log10(raw));
   const step = [1, 2, 5, 10].map((f) => f * 10 ** power).find((s) => s >= raw * 0.9999) ?? raw;
   const at: number[] = [];
-  for (let i = ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) at.push(i * step || 0);
+  const first = ceil(low / step - 1e-9);
+  for (let k = 0; k < 50 && (first + k) * step <= high + 1e-9 * step; k++) at.push((first + k) * step || 0);
   return { at, digits: max(0, -floor(log10(step) + 1e-9)), step };
 }
 
@@ -229,6 +238,12 @@ const PREFIXED = new Set(["m", "s", "V", "rad", "A", "W"]);
 export function scaled(size: number, unit: string): [number, string] {
   if (!PREFIXED.has(unit) || !(size > 0) || size >= 0.1) return [1, unit];
   return size >= 1e-4 ? [1e3, "m" + unit] : size >= 1e-7 ? [1e6, "µ" + unit] : [1e9, "n" + unit];
+}
+
+/** A size in two digits: "0.34 mm". */
+export function brief(size: number, unit: string): string {
+  const [factor, prefixed] = scaled(size, unit);
+  return `${plain(Number((size * factor).toPrecision(2)))} ${prefixed}`;
 }
 
 /** Quantile of numbers, 0 to 1; nulls do not count; NaN of none. */

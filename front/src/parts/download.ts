@@ -10,13 +10,13 @@ function save(name: string, blob: Blob): void {
 }
 
 function stem(name: string): string {
-  return name.normalize("NFKD").replace(/[^\w.-]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 80) || "catseye";
+  return name.replace(/[^\p{L}\d-]+/gu, " ").trim().slice(0, 80) || "catseye";
 }
 
 /** Table as CSV text: label and unit in the first line, values in full, rows in the order of `order`. */
 export function csvText(table: Table, order?: ArrayLike<number>): string {
   const cell = (value: unknown) => {
-    const text = value === null || value === undefined ? "" : String(value);
+    const text = String(value ?? "");
     return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
   };
   const columns = table.columns;

@@ -52,10 +52,10 @@ void main(){v=k;r=h;gl_Position=m*vec4(o,1);gl_Position.z-=.0004*gl_Position.w;g
 const DISC = `in vec4 v;flat in float r;out vec4 o;
 void main(){float d=length(gl_PointCoord-.5)*2.;if(d>1.||(r>0.&&d<.62))discard;o=vec4(v.rgb,1);}`;
 // A segment as a strip of two triangles, so that lines have a width.
-const LINE = `uniform mat4 m;uniform vec2 z;uniform float s,l;in vec2 p;in vec3 a,b;in vec2 g;in vec4 k;in float t;out vec4 v;
+const LINE = `uniform mat4 m;uniform vec2 z;uniform float l;in vec2 p;in vec3 a,b;in vec2 g;in vec4 k;in float t;out vec4 v;
 void main(){vec4 x=m*vec4(a,1),y=m*vec4(b,1);x.w=max(x.w,1e-3);y.w=max(y.w,1e-3);vec2 d=(y.xy/y.w-x.xy/x.w)*z;d=d/max(length(d),1e-6);
 bool h=l>=0.&&(g.x==l||g.y==l);v=k;if(h)v.a=1.;else if(l>=0.)v.a*=.35;
-gl_Position=mix(x,y,p.x);gl_Position.xy+=vec2(-d.y,d.x)*p.y*(t*.1+(h?.6:0.))*s/z*gl_Position.w;if(k.a==0.)gl_Position=vec4(2,2,2,1);}`;
+gl_Position=mix(x,y,p.x);gl_Position.xy+=vec2(-d.y,d.x)*p.y*(t*.1+(h?.6:0.))/z*gl_Position.w;if(k.a==0.)gl_Position=vec4(2,2,2,1);}`;
 const FLAT = `in vec4 v;out vec4 o;void main(){o=v;}`;
 
 /** Programs and buffers in a context; null where a program cannot be made. */
@@ -132,7 +132,6 @@ export function drawing(gl: WebGL2RenderingContext, divided: boolean): Drawn | n
       gl.depthMask(false);
       const set = use(lines, lineArray);
       set("z", ...size);
-      set("s", ratio);
       set("l", selected);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, segments);
       gl.depthMask(true);

@@ -1,6 +1,6 @@
 // Numbers as text: rounded by their standard uncertainty, with a true minus sign.
 import type { Num } from "../lib/types";
-import { abs, clamp, floor, log10, max, round } from "./maths";
+import { abs, clamp, floor, known, log10, max, round } from "./maths";
 
 const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 
@@ -12,7 +12,7 @@ export function fixed(value: number, digits: number): string {
 
 /** Value without an uncertainty: six significant digits, no zeros at the end. */
 export function plain(value: Num): string {
-  if (value === null || !Number.isFinite(value)) return "unknown";
+  if (!known(value)) return "unknown";
   const size = abs(value);
   if (size && (size < 1e-4 || size >= 1e15)) {
     const [mantissa, power] = value.toExponential(4).split("e");
@@ -40,9 +40,10 @@ export function rounded(value: number, places: number): string {
 
 /** Value with its standard uncertainty and unit: "12.3457 ± 0.0012 m"; null is "unknown". */
 export function shown(value: Num, u?: Num, unit = ""): string {
-  if (value === null || !Number.isFinite(value)) return "unknown";
-  const tail = unit && (/^[°′″]/.test(unit) && unit.length === 1 ? unit : "\u00a0" + unit);
-  if (u === null || u === undefined || !(u > 0) || !Number.isFinite(u)) return plain(value) + tail;
+  if (!known(value)) return "unknown";
+  const tight = /^[°′″]$/.test(unit);
+  const tail = tight ? unit : unit && "\u00a0" + unit;
+  if (!known(u) || u <= 0) return plain(value) + tail;
   const places = decimals(u);
   if (places > 8) {
     const power = floor(log10(max(abs(value), u)));
@@ -50,5 +51,5 @@ export function shown(value: Num, u?: Num, unit = ""): string {
     return `(${rounded(v, decimals(s))} ± ${rounded(s, decimals(s))}) × ${tenTo(power)}${tail}`;
   }
   const text = `${rounded(value, places)} ± ${rounded(u, places)}`;
-  return unit === tail && unit ? `(${text})${tail}` : text + tail;
+  return tight ? `(${text})${unit}` : text + tail;
 }

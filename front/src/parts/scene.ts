@@ -1,18 +1,19 @@
 // Scene: points with 95 % ellipsoids, beams and structure in three dimensions, in raw WebGL 2.
 import type { Num, Scene } from "../lib/types";
 import { axesOf, fitted, matrixOf, picked, projected, type Camera } from "./camera";
-import { announce, button, channels, context, el, extent as spread, fill, FONT, paper, pixels, scaled, segment, set, stroke, surface, ticks, type Options, type Palette, type Part } from "./dom";
+import { announce, brief, button, channels, context, el, extent as spread, fill, FONT, paper, pixels, segment, set, stroke, surface, ticks, type Options, type Palette, type Part } from "./dom";
 import { png } from "./download";
 import { ellipsoids, type Ellipsoids } from "./ellipsoids";
 import { drawing, type Drawn } from "./gl";
-import { plain, rounded, shown } from "./number";
-import { abs, ceil, clamp, floor, hypot, known, log10, max, min, PI, round, sqrt } from "./maths";
+import { plain, shown } from "./number";
+import { abs, ceil, clamp, hypot, known, max, min, PI, round, sqrt } from "./maths";
 import "./parts.css";
 
 const MANY = 1000; // points above which spheres are coarser, and edges not smoothed without a graphics processor
 const REACH = 12; // px from a point within which it is meant
 const LABELLED = 40; // members up to which the points of a group have labels
 const VIEWS = { Oblique: [-0.6, 0.45], Top: [0, PI / 2], Front: [0, 0], Side: [PI / 2, 0] } as const;
+const ARROWS: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const SLOW = 120; // ms of a frame above which beams wait until the scene rests
 const [WIDE, HIGH] = [680, 460]; // px of a picture on paper
 type Entry = [text: string, colour: string, group?: number];
@@ -20,7 +21,7 @@ type Entry = [text: string, colour: string, group?: number];
 export function scene(host: HTMLElement, data: Scene, options: Options = {}): Part<Scene> {
   const label = options.label ?? "Network";
   const legend = el("div.ce-legend");
-  const live = el("canvas", { "aria-hidden": "true" });
+  const live = el("canvas", { "aria-hidden": true });
   const self = surface(host, "scene", label, { paint, scheme: () => ((stale = true), keys()), raster: () => composed(2) });
   const { canvas: over, stage, spoken, dirty } = self;
   const withBeams = button("Beams", () => {
@@ -47,7 +48,6 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   const hidden = new Set<number>(); // groups
   let beams = true;
   let selected = -1;
-  let hovered = -1;
   let screen = new Float32Array();
   let width = 0;
   let height = 0;
@@ -85,27 +85,25 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   }
 
   function upload(c: Palette): void {
-    const cache = new Map<string, number[]>();
-    const rgb = (colour: string) => cache.get(colour) ?? (cache.set(colour, channels(colour)), cache.get(colour)!);
     const n = positions.length / 3;
     const tints: number[] = [];
     for (let i = 0; i < n; i++) {
       const v = value?.values[i];
-      const colour = rgb(!value ? c.group(groupOf(i)) : known(v) ? c.diverging(v / end) : c.faint);
+      const colour = channels(!value ? c.group(groupOf(i)) : known(v) ? c.diverging(v / end) : c.faint);
       // Capped ellipsoids are half way to the ground's colour.
-      tints.push(...colour.map((tint, k) => (shape.capped[i] ? (tint + rgb(c.paper)[k]!) / 2 : tint)), present(i) ? 255 : 0);
+      tints.push(...colour.map((tint, k) => (shape.capped[i] ? (tint + channels(c.paper)[k]!) / 2 : tint)), present(i) ? 255 : 0);
     }
     // Structure first, then beams with the largest |w| last, above the others.
     const { from = [], to = [], value: ws = [] } = data.beams ?? {};
     const order = from.map((_, k) => k).sort((i, j) => abs(ws[i] ?? 0) - abs(ws[j] ?? 0));
     const ends = [...structure], at: number[] = [], hues: number[] = [], wide: number[] = [];
-    for (let i = 0; i < structure.length; i += 6) at.push(-2, -2), hues.push(...rgb(c.faint), 200), wide.push(14);
+    for (let i = 0; i < structure.length; i += 6) at.push(-2, -2), hues.push(...channels(c.faint), 200), wide.push(14);
     const opaque = [0, 1, 2].map((k) => 255 * min(1, [0.1, 0.3, 0.7][k]! + 60 / (1 + ws.filter((w) => max(grade(w), 0) === k).length)));
     for (const k of order) {
       const [f, t, g] = [from[k]!, to[k]!, max(grade(ws[k]), 0)];
       ends.push(...positions.subarray(3 * f, 3 * f + 3), ...positions.subarray(3 * t, 3 * t + 3));
       at.push(f, t);
-      hues.push(...rgb(gradeColour(g, c)), present(f) && present(t) ? opaque[g]! : 0);
+      hues.push(...channels(gradeColour(g, c)), present(f) && present(t) ? opaque[g]! : 0);
       wide.push(10 + 5 * g);
     }
     drawn!.fill([
@@ -122,7 +120,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     drawn = gl && drawing(gl, few);
     stale = true;
     if (drawn) return;
-    stage.replaceChildren(el("p.ce-none", {}, "This browser has no WebGL 2 to draw in space: the table has all points and uncertainties."));
+    stage.replaceChildren(el("p.ce-none", {}, "No WebGL 2 in this browser: the table has all points and uncertainties."));
     self.bar.hidden = true;
   }
 
@@ -134,7 +132,8 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     if (!drawn) return;
     camera ??= view(...VIEWS.Oblique, w / h);
     const [across, down] = [round(w * ratio), round(h * ratio)];
-    if (live.width !== across || live.height !== down) Object.assign(live, { width: across, height: down });
+    if (live.width !== across) live.width = across; // clears
+    if (live.height !== down) live.height = down;
     if (stale) upload(c);
     const m = matrixOf(camera, w / h, extent);
     const { back } = axesOf(camera);
@@ -163,7 +162,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     points.group.forEach((k) => sizes[k]!++);
     const rank = (i: number) => (i === selected ? 0 : sizes[groupOf(i)]! + screen[4 * i + 2]! / (12 * extent + screen[4 * i + 2]!));
     const taken = [[0, h - 64, 70, h], [0, 0, 260, 40]];
-    for (const i of points.name.map((_, k) => k).filter((k) => seen(k) && (k === selected || sizes[groupOf(k)]! <= LABELLED)).sort((i, j) => rank(i) - rank(j)).slice(0, 90)) {
+    for (const i of points.name.map((_, k) => k).filter((k) => seen(k) && (k === selected || sizes[groupOf(k)]! <= LABELLED)).sort((i, j) => rank(i) - rank(j)).slice(0, 40)) {
       const name = points.name[i]!;
       const [x, y, away] = places(i);
       const wide = g.measureText(name).width;
@@ -174,9 +173,9 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
         break;
       }
     }
-    for (const i of [selected, hovered]) if (seen(i)) {
-      const [x, y, r] = places(i);
-      stroke(g, c.ink, i === selected ? 2.5 : 1, () => g.arc(x, y, r + 2, 0, 7));
+    if (seen(selected)) {
+      const [x, y, r] = places(selected);
+      stroke(g, c.ink, 2.5, () => g.arc(x, y, r + 2, 0, 7));
     }
     write(`frame ${data.frame}`, 8, 12, c.faint);
     if (shape.known) write(`95 % ellipsoids × ${plain(shape.factor)}${shape.capped.includes(1) ? "; pale: capped, truly larger" : ""}`, 8, 28, c.faint);
@@ -187,11 +186,10 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
       if (abs(back[k]!) < 0.97) write(name, 31 + 31 * x, h - 34 + 31 * y);
     });
     const length = ticks(0, 90 / scale, 1.2).step;
-    const [factor, unit] = scaled(length, "m");
     const x = w - 12 - length * scale;
     stroke(g, c.ink, 2, () => [[x, 18], [x, 12], [w - 12, 12], [w - 12, 18]].forEach(([a, b]) => g.lineTo(a!, h - b!)));
     g.textAlign = "right";
-    write(`${plain(length * factor)} ${unit}`, w - 14, h - 24);
+    write(brief(length, "m"), w - 14, h - 24);
   }
 
   function paint(w: number, now: number): void {
@@ -238,9 +236,8 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   function keyList(c: Palette): Entry[] {
     const list: Entry[] = data.groups.map((name, k) => [name, value ? "" : c.group(k), k]);
     if (value) {
-      const [factor, unit] = scaled(end, value.unit);
-      const bound = plain(Number((end * factor).toPrecision(2)));
-      list.push([`${value.label} \u2212${bound} ${unit}`, c.diverging(-1)], ["0", c.mid], [`+${bound} ${unit}`, c.high]);
+      const bound = brief(end, value.unit);
+      list.push([`${value.label} \u2212${bound}`, c.low], ["0", c.mid], [`+${bound}`, c.high]);
     }
     if (shape.axes.some((_, i) => undetermined(i))) list.push(["○ undetermined: no ellipsoid", ""]);
     const values = beams ? (data.beams?.value ?? []) : [];
@@ -279,9 +276,8 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
       return `${k} ${shown(p[k][i]!, known(variance) ? sqrt(variance) : null, "m")}`;
     })];
     const axis = shape.axes[i]!;
-    const [f, unit] = scaled(axis, "m");
     if (undetermined(i)) list.push("undetermined: no ellipsoid");
-    else if (axis > 0) list.push(`95 % half axis ${rounded(axis * f, max(0, 1 - floor(log10(axis * f))))} ${unit}${shape.capped[i] ? " (drawn smaller: capped)" : ""}`);
+    else if (axis > 0) list.push(`95 % half axis ${brief(axis, "m")}${shape.capped[i] ? " (drawn smaller: capped)" : ""}`);
     if (value) list.push(`${value.label} ${shown(value.values[i]!, null, value.unit)}`);
     if (p.info?.[i]) list.push(p.info[i]);
     return list;
@@ -299,7 +295,6 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   function hover(i: number): void {
     self.show(screen[4 * i] ?? 0, screen[4 * i + 1] ?? 0, i < 0 ? [] : lines(i));
     over.style.cursor = i < 0 ? "" : "pointer";
-    hovered = i;
   }
   function turn(dx: number, dy: number): void {
     camera!.yaw -= dx;
@@ -356,19 +351,6 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     event.preventDefault();
     zoom(Math.exp(clamp(event.deltaY, -120, 120) * 0.0016));
   }, { passive: false });
-  const KEYS: Record<string, (far: boolean) => void> = {
-    ArrowLeft: (far) => (far ? shift(30, 0) : turn(-0.1, 0)),
-    ArrowRight: (far) => (far ? shift(-30, 0) : turn(0.1, 0)),
-    ArrowUp: (far) => (far ? shift(0, 30) : turn(0, -0.1)),
-    ArrowDown: (far) => (far ? shift(0, -30) : turn(0, 0.1)),
-    "+": () => zoom(0.85),
-    "=": () => zoom(0.85),
-    "-": () => zoom(1.18),
-    Home: () => ((camera = null), dirty()),
-    Escape: () => mark(-1),
-    PageDown: () => step(1),
-    PageUp: () => step(-1),
-  };
   function step(by: number): void {
     const n = points.name.length;
     let i = selected < 0 && by < 0 ? 0 : selected;
@@ -378,15 +360,23 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     }
   }
   over.onkeydown = (event) => {
-    const act = KEYS[event.key];
-    if (!act || !camera || event.ctrlKey || event.altKey || event.metaKey) return;
+    const { key } = event;
+    if (!camera || event.ctrlKey || event.altKey || event.metaKey) return;
+    const [x, y] = ARROWS[key] ?? [0, 0];
+    const by = { PageDown: 1, PageUp: -1 }[key];
+    const closer = { "+": 0.85, "=": 0.85, "-": 1.18 }[key];
+    if (x || y) event.shiftKey ? shift(-30 * x, -30 * y) : turn(x / 10, y / 10);
+    else if (by) step(by);
+    else if (closer) zoom(closer);
+    else if (key === "Escape") mark(-1);
+    else if (key === "Home") (camera = null), dirty();
+    else return;
     event.preventDefault();
-    act(event.shiftKey);
   };
   live.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     drawn = null;
-    spoken.textContent = "The browser took the picture's memory away; waiting for it.";
+    spoken.textContent = "The browser lost the picture; waiting for it.";
   });
   live.addEventListener("webglcontextrestored", () => {
     begin();

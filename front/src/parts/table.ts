@@ -15,7 +15,7 @@ const order = new Intl.Collator("en", { numeric: true });
 /** Text of a cell: decimals by its column, or by its own uncertainty. */
 export function cellText(column: Column, row: number, u?: Column): string {
   const value = column.values[row];
-  if (column.kind !== "number" || typeof value === "string") return value === null || value === undefined ? "" : String(value);
+  if (column.kind !== "number" || typeof value === "string") return String(value ?? "");
   if (!known(value)) return "unknown";
   if (column.digits !== undefined) return fixed(value, column.digits);
   const s = u?.values[row];
@@ -61,7 +61,7 @@ export function conditions(filter: string, columns: Column[], text: (row: number
 /** Rows in the order of a column; unknown values last either way. */
 export function sorted(rows: number[], column: Column, down: boolean): number[] {
   const sign = down ? -1 : 1;
-  const missing = (v: Num | string | undefined) => v === null || v === undefined || v === "" || Number.isNaN(v);
+  const missing = (v: Num | string | undefined) => (v ?? "") === "" || Number.isNaN(v);
   return [...rows].sort((i, j) => {
     const [a, b] = [column.values[i], column.values[j]];
     if (missing(a) || missing(b)) return Number(missing(a)) - Number(missing(b)) || i - j;
@@ -100,15 +100,17 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   const text = (row: number) => (texts[row] ??= columns.map((c) => cell(c, row)).join(" ").toLowerCase());
 
   function header(): void {
-    head.replaceChildren(...columns.map((c) => {
-      const state = sort?.key === c.key ? (sort.down ? "descending" : "ascending") : "none";
+    head.replaceChildren(...columns.map((c, k) => {
+      const down = sort?.key === c.key ? sort.down : null;
       const press = button(c.label, () => {
-        sort = state === "none" ? { key: c.key, down: false } : state === "ascending" ? { key: c.key, down: true } : null;
+        sort = down ? null : { key: c.key, down: down === false };
+        scroll.scrollTop = 0;
         arrange();
-        [...head.querySelectorAll("button")][columns.indexOf(c)]?.focus();
+        head.querySelectorAll("button")[k]!.focus();
       });
-      if (c.unit) press.append(el("small", {}, ` ${c.unit}`));
-      return el(`th.ce-${c.kind}`, { scope: "col", "aria-sort": state }, press);
+      press.append(el("small", {}, ` ${c.unit}`));
+      // Buttons are not repeated on the next sheet of paper, texts are.
+      return el(`th.ce-${c.kind}`, { "aria-sort": down === null ? "none" : down ? "descending" : "ascending" }, ...(all ? press.childNodes : [press]));
     }));
     // Fixed widths where rows come and go, from the longest text of each column.
     widths.replaceChildren();
@@ -116,7 +118,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     if (!windowed()) return;
     let total = 0;
     for (const c of columns) {
-      let longest = c.label.length + (c.unit ? c.unit.length + 1 : 0) + 2;
+      let longest = c.label.length + c.unit.length + 3;
       const step = max(1, floor(count / 2000));
       for (let i = 0; i < count; i += step) longest = max(longest, cell(c, i).length);
       const width = min(longest, 44) + 2.5;
@@ -208,13 +210,9 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
       paint();
     });
   }, { passive: true });
-  let typing = 0;
   input.oninput = () => {
-    clearTimeout(typing);
-    typing = setTimeout(() => {
-      scroll.scrollTop = 0;
-      arrange();
-    }, 120);
+    scroll.scrollTop = 0;
+    arrange();
   };
   body.onclick = (event) => {
     const at = (event.target as HTMLElement).closest("tr")?.dataset.at;
@@ -247,7 +245,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     count = columns[0]?.values.length ?? 0;
     grid.classList.toggle("ce-named", named() !== null);
     bar.hidden = options.filter === false;
-    input.hidden = count < 6;
+    input.hidden = count < 9;
     arrange();
   }
   const resize = new ResizeObserver(() => windowed() && paint());
@@ -269,7 +267,6 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     destroy() {
       stop();
       resize.disconnect();
-      clearTimeout(typing);
       box.remove();
     },
   };
