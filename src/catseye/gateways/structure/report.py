@@ -31,7 +31,6 @@ from catseye.reduction.structure.findings import StructureFindings
 from catseye.reduction.structure.series import StructureFit
 from catseye.reduction.structure.vibration import Vibration
 
-BAND = 2.0  # standard uncertainties shown
 GRID = 61  # points of a model's curve
 MOST_RESIDUALS = 20_000  # drawn
 
@@ -82,7 +81,7 @@ def _motion(fit: StructureFit) -> list[Block]:
     blocks: list[Block] = []
     for c in range(6):
         scale, unit = (MILLIMETRE, "mm") if c < 3 else (ARCSECOND, "″")
-        u = BAND * np.sqrt(np.maximum(predicted.six_covariance[:, c, c], 0.0))
+        u = np.sqrt(np.maximum(predicted.six_covariance[:, c, c], 0.0))
         name = f"{'shift along' if c < 3 else 'rotation about'} {'xyz'[c % 3]}"
         chart = Chart(
             "scatter",
@@ -90,12 +89,12 @@ def _motion(fit: StructureFit) -> list[Block]:
             Axis(name, unit, np.concatenate([predicted.six[:, c], at.six[:, c] + motion[:, c]]) / scale, digits=5),
             u=np.concatenate([u / scale, np.full(len(e), np.nan)]),
             group=[0] * GRID + [1] * len(e),
-            groups=(f"model, ± {BAND:g} u of a future epoch", "epochs"),
+            groups=("model, with u of a future epoch", "epochs"),
         )
         blocks.append(ChartBlock(f"motion-{c + 1}", chart, f"{name[:1].upper()}{name[1:]}."))
     lead = (
-        "Shift and rotation about the pivot from the mean of the epochs, at the reference temperature. Bars: two "
-        "standard uncertainties of a future epoch. Epochs are without temperature and direction terms."
+        "Shift and rotation about the pivot from the mean of the epochs, at the reference temperature. Bars: "
+        "standard uncertainty of a future epoch. Epochs are without temperature and direction terms."
     )
     return [Text(lead), *blocks]
 
