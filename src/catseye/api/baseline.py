@@ -21,10 +21,13 @@ from catseye.errors import ArgumentError
 from catseye.reduction.baseline.settings import BaselineSettings
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.baseline.result import BaselineCalibration
     from catseye.reduction.calibrations.conformity import CertificateIssue
 
@@ -116,6 +119,12 @@ class BaselineResult(Result):
         made = partial(baseline_subject, self.calibration, self.hashes, self.provenance)
         page = certificate_page(CertificateFile(made, self.issue))
         return {"record": SinglePage(MARK, text), "certificate": page}
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.baseline.report import baseline_report
+
+        return baseline_report(self.calibration, when, self.hashes)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye baseline --out`."""
