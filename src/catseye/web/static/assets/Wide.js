@@ -1,0 +1,1 @@
+import{H as e,N as t,W as n,et as r,rt as i,vt as a,x as o}from"./route.svelte.js";import"./Loaded.js";var s=n(`<div class="p-scroll" tabindex="0" role="region"><!></div>`);function c(n,c){var l=s(),u=i(l);t(u,()=>c.children),a(l),r(()=>o(l,`aria-label`,c.label)),e(n,l)}export{c as t};

@@ -1,0 +1,1 @@
+import{gt as e}from"./route.svelte.js";e();
