@@ -1,0 +1,89 @@
+"""Subject of a page: a living site, a journal, or a finished result."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from fastapi import HTTPException
+
+from catseye.version import __version__
+from catseye.web.answers import QueryDesk
+from catseye.web.feed import LiveFeed
+
+if TYPE_CHECKING:
+    from catseye.api.pages import PageSettings
+    from catseye.api.watching import SiteWatch
+
+UNIX_EPOCH, DAY = 40_587.0, 86_400.0  # MJD; s
+
+
+@dataclass(frozen=True)
+class PageSubject:
+    """Subject of a page.
+
+    kind       "site", "journal" or "result"
+    name       of the site or of the result
+    watch      of a site or a journal; None for a result
+    report     of a result; None for a site and a journal
+    commands   True if it takes commands
+    """
+
+    kind: str
+    name: str
+    watch: "SiteWatch | None" = None
+    report: dict[str, Any] | None = None
+    commands: bool = False
+    desk: QueryDesk = field(default_factory=QueryDesk)
+    feed: LiveFeed = field(default_factory=LiveFeed)
+
+    def site(self) -> "SiteWatch":
+        """Watch of the site.
+
+        Raises HTTPException 404 for a result.
+        """
+        if self.watch is None:
+            raise HTTPException(404, "this page shows a result, not a site (expected /api/report)")
+        return self.watch
+
+    def to_object(self, *, needs_token: bool) -> dict[str, Any]:
+        """JSON object of /api/service."""
+        return {
+            "version": __version__,
+            "kind": self.kind,
+            "name": self.name,
+            "commands": self.commands,
+            "history": self.watch is not None and self.watch.history,
+            "needs_token": needs_token,
+            "now": self._now(),
+        }
+
+    def _now(self) -> float:
+        import time
+
+        mjd = None if self.watch is None else self.watch.now()
+        return UNIX_EPOCH + time.time() / DAY if mjd is None else mjd
+
+
+def subject_of(settings: "PageSettings") -> PageSubject:
+    """Subject that the settings name.
+
+    Raises InputError: a site, a journal or a result that cannot be read.
+    """
+    if settings.kind == "result":
+        from catseye.api.exploring import report_of
+
+        assert settings.path is not None
+        report = report_of(settings.path)
+        return PageSubject(kind="result", name=str(report["title"]), report=report)
+    from catseye.api.watching import watch_journal, watch_site
+
+    if settings.kind == "journal":
+        assert settings.journal is not None
+        watch = watch_journal(settings.journal)
+    else:
+        assert settings.site is not None
+        assert settings.coordinator is not None
+        watch = watch_site(
+            settings.site, coordinator=settings.coordinator, rangers=settings.rangers, journal=settings.journal
+        )
+    commands = settings.kind == "site" and settings.token is not None
+    return PageSubject(kind=settings.kind, name=str(watch.site()["name"]), watch=watch, commands=commands)
