@@ -23,6 +23,11 @@ class Source:
 
 
 SOURCES: dict[str, Source] = {
+    "ISA182": Source(
+        title="ANSI/ISA-18.2-2016, Management of alarm systems for the process industries",
+        locator="International Society of Automation, 2016",
+        used="clause 5.5, states of an alarm: acknowledged, returned, shelved (`coordinator.alarms`)",
+    ),
     "PARKER04": Source(
         title="D. H. Parker, Working notes on the Green Bank Telescope laser metrology system, 2004",
         locator="National Radio Astronomy Observatory, 29 April 2004",

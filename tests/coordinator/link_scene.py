@@ -8,7 +8,7 @@ import numpy as np
 from catseye.coordinator.link.preparation import Preparation
 from catseye.coordinator.link.ranger import LinkListeners, RangerLink
 from catseye.coordinator.link.settings import Address
-from catseye.coordinator.parts import Environment, PlannedShot, ticks_now
+from catseye.coordinator.parts import Environment, PlannedShot, SunZone, ticks_now
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, TimeTag
 from catseye.ranger.line import Request
@@ -178,6 +178,9 @@ class Free:
 
     def sun_vector(self, ranger, now_ticks):
         return 0.0, 0.0, 1.0
+
+    def sun_zone(self, now_ticks):
+        return SunZone(1.0, 0.5, 0.1, True)
 
     def watch(self, now_ticks, counts):
         return [alarm for alarm in self.alarms if alarm.ranger in counts]

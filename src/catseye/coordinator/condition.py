@@ -1,6 +1,6 @@
 """Condition of a site for screen and STATUS: problems, rangers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from catseye.coordinator.firing import GOOD, Firing
@@ -45,8 +45,12 @@ WRONG: dict[str, Severity] = {  # states of a ranger, and their severity
 
 @dataclass(frozen=True)
 class StandingProblem:
-    """An ongoing problem, in one line."""
+    """An ongoing problem, in one line.
 
+    id   the same while it lasts, and when it returns: a word, behind a colon the ranger
+    """
+
+    id: str
     severity: Severity
     text: str
 
@@ -56,7 +60,8 @@ class SiteCondition:
     """A site at one instant.
 
     word       "starting", "well", "impaired", "alarm", or "stopped" if no shots are taken
-    problems   alarms first
+    problems   alarms first; rangers of one state together
+    alarms     the same, a ranger each
     rangers    name: a word of `SIGNS`
     troubles   name: ongoing conditions of a ranger, kinds of events
     epoch      number of the last epoch, 0 before the first
@@ -69,6 +74,7 @@ class SiteCondition:
 
     word: str
     problems: tuple[StandingProblem, ...]
+    alarms: tuple[StandingProblem, ...]
     rangers: Mapping[str, str]
     troubles: Mapping[str, tuple[str, ...]]
     epoch: int
@@ -126,11 +132,13 @@ class ConditionWatch:
     def now(self) -> SiteCondition:
         """The condition at this instant."""
         rangers = {name: self._ranger(name, link) for name, link in self._links.items()}
-        problems = [*self._machine(), *self._measuring(), *_of_rangers(rangers, starting=self._starting)]
+        of_site, states = [*self._machine(), *self._measuring()], _names_by_state(rangers, starting=self._starting)
+        problems = [*of_site, *(_of_rangers(state, names) for state, names in states.items())]
         problems.sort(key=lambda each: each.severity != "alarm")
         return SiteCondition(
             word=self._word(problems),
             problems=tuple(problems),
+            alarms=(*of_site, *(_of_ranger(state, name) for state, names in states.items() for name in names)),
             rangers=rangers,
             troubles={name: link.troubles for name, link in self._links.items()},
             epoch=self._epoch,
@@ -180,12 +188,16 @@ class ConditionWatch:
         """Problems of journal, clock and disk."""
         problems = []
         if self._intake.trouble is not None:
-            problems.append(StandingProblem("alarm", f"journal: {self._intake.trouble}: measuring suspended"))
+            problems.append(
+                StandingProblem("journal", "alarm", f"journal: {self._intake.trouble}: measuring suspended")
+            )
         if not self._clock_believed():
-            problems.append(StandingProblem("alarm", "clock: this machine's clock is in doubt: no shots are taken"))
+            problems.append(
+                StandingProblem("clock", "alarm", "clock: this machine's clock is in doubt: no shots are taken")
+            )
         if self.disk is not None and self.disk.seconds < A_DAY:
             severity: Severity = "alarm" if self.disk.seconds < AN_HOUR else "warning"
-            problems.append(StandingProblem(severity, f"disk: full in {span_text(self.disk.seconds)}"))
+            problems.append(StandingProblem("disk", severity, f"disk: full in {span_text(self.disk.seconds)}"))
         return problems
 
     def _measuring(self) -> list[StandingProblem]:
@@ -193,18 +205,22 @@ class ConditionWatch:
         problems = []
         mode, quiet, unsolved = self._mode(), self._fired_since, self._since(self._solved)
         if mode != "active":
-            problems.append(StandingProblem("warning", f"mode {mode}: no shots are taken"))
+            problems.append(StandingProblem("mode", "warning", f"mode {mode}: no shots are taken"))
         elif quiet > NO_SHOT and not self._starting:
-            problems.append(StandingProblem("alarm", f"no shot for {span_text(quiet)}"))
+            problems.append(StandingProblem("no-shot", "alarm", f"no shot for {span_text(quiet)}"))
         if not self._telescope_known() and not self._starting:
-            problems.append(StandingProblem("alarm", "telescope: no posture, targets on it are not measured"))
+            problems.append(
+                StandingProblem("telescope", "alarm", "telescope: no posture, targets on it are not measured")
+            )
         if self._verdict is not None and self._verdict.word != "good":
             severity: Severity = "alarm" if self._verdict.word == "failed" else "warning"
             problems.append(
-                StandingProblem(severity, f"epoch {self._epoch or 'none'} {self._verdict.word}: {self._verdict.why}")
+                StandingProblem(
+                    "epoch", severity, f"epoch {self._epoch or 'none'} {self._verdict.word}: {self._verdict.why}"
+                )
             )
         elif mode == "active" and unsolved > NO_EPOCH and not self._starting:
-            problems.append(StandingProblem("alarm", f"no epoch for {span_text(unsolved)}"))
+            problems.append(StandingProblem("no-epoch", "alarm", f"no epoch for {span_text(unsolved)}"))
         return problems
 
     def _word(self, problems: list[StandingProblem]) -> str:
@@ -217,15 +233,35 @@ class ConditionWatch:
         return "starting" if self._starting else "well"
 
 
-def _of_rangers(rangers: Mapping[str, str], *, starting: bool) -> list[StandingProblem]:
-    """A problem per state in which rangers do not measure."""
-    problems = []
-    for word, severity in WRONG.items():
+def _names_by_state(rangers: Mapping[str, str], *, starting: bool) -> dict[str, list[str]]:
+    """Names of rangers by the state in which they do not measure."""
+    states = {}
+    for word in WRONG:
         names = [name for name, state in rangers.items() if state == word]
         if names and not (starting and word in ("not ready", "not connected", "dark", "idle")):
-            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-            problems.append(StandingProblem(severity, f"{len(names)} {word}: {', '.join(names[:MOST_NAMES])}{more}"))
-    return problems
+            states[word] = names
+    return states
+
+
+def _of_rangers(state: str, names: Sequence[str]) -> StandingProblem:
+    """Problem of all rangers of one state."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    text = f"{len(names)} {state}: {', '.join(names[:MOST_NAMES])}{more}"
+    return StandingProblem(_word_of(state), WRONG[state], text)
+
+
+def _of_ranger(state: str, name: str) -> StandingProblem:
+    """Problem of one ranger."""
+    return StandingProblem(f"{_word_of(state)}:{name}", WRONG[state], f"{name}: {state}")
+
+
+def _word_of(state: str) -> str:
+    """State of a ranger as one word.
+
+    >>> _word_of("another's"), _word_of("not ready")
+    ('anothers', 'not-ready')
+    """
+    return state.replace(" ", "-").replace("'", "")
 
 
 def verdict_of(solution: EpochSolution) -> Verdict:

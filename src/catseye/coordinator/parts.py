@@ -84,6 +84,21 @@ class Planner(Protocol):
     def round(self, state: SiteState) -> Round: ...
 
 
+@dataclass(frozen=True)
+class SunZone:
+    """Sun and the cone that no beam enters, rad.
+
+    azimuth, elevation   from the site, azimuth from north clockwise
+    cone                 half angle
+    avoided              False if the Sun is set
+    """
+
+    azimuth: float
+    elevation: float
+    cone: float
+    avoided: bool
+
+
 class SafetyAlarm(Protocol):
     """A hazard that comes to a parked beam.
 
@@ -120,6 +135,10 @@ class RequestGuard(Protocol):
 
         Raises InputError if the telescope's posture is missing.
         """
+        ...
+
+    def sun_zone(self, now_ticks: int) -> SunZone:
+        """The Sun over the site."""
         ...
 
     def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> Sequence[SafetyAlarm]:

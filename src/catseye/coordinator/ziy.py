@@ -5,11 +5,13 @@ one is planned and started, and then the epoch is solved while the mirrors turn.
 """
 
 import asyncio
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import islice
 
+from catseye.coordinator.alarms import AlarmBook
 from catseye.coordinator.condition import ConditionWatch
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import FeedClient, FeedSettings, MotionScript, play
@@ -27,10 +29,12 @@ from catseye.coordinator.modes import Mode
 from catseye.coordinator.parts import (
     TICKS_PER_SECOND,
     Environment,
+    PlannedShot,
     Planner,
     RequestGuard,
     Round,
     SiteState,
+    SunZone,
     ticks_now,
 )
 from catseye.coordinator.station_events import StationEvents
@@ -41,6 +45,7 @@ from catseye.records.night.live import Happening, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochAnswer, Live
 
+ALARMS_EVERY = 1.0  # s
 LINK_STATES: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
 
 
@@ -144,6 +149,8 @@ class Coordinator:
             clock_believed=lambda: self.host_clock.believed,
             telescope_known=lambda: self.telescope_known,
         )
+        self.alarms = AlarmBook(clock, lambda: self.condition.now().alarms, EventLog("alarms", clock, self.tell))
+        self.planned: Round | None = None  # the round under way
         self._script = feed if isinstance(feed, MotionScript) else None
         self.feed = self._listening(*feed, environment) if isinstance(feed, tuple) else None
         self.posture: LivePosture | None = None
@@ -195,8 +202,9 @@ class Coordinator:
 
         Then switch off lasers that were switched on here, and close the journal, within 5 s.
         """
+        name = self.site.site.campaign.name
         self._event_log.tell(
-            "started", f"coordinator of {self.site.site.campaign.name}, {len(self.links)} rangers, {self.mode}"
+            "started", f"coordinator of {name}, {len(self.links)} rangers, {self.mode}", mode=self.mode
         )
         for name, link in self.links.items():
             self._spawn(link.run(), f"link {name}")
@@ -209,6 +217,7 @@ class Coordinator:
         )
         self._spawn(self.host_clock.run(), "clocks")
         self._spawn(self._rounds(), "rounds")
+        self._spawn(self._look_at_alarms(), "alarms")
         self.firing.broken, self.intake.broken = (asyncio.get_running_loop().create_future() for _ in range(2))
         try:
             parts = [*self._tasks, self.firing.broken, self.intake.broken]
@@ -248,6 +257,12 @@ class Coordinator:
         for link in self.links.values():
             link.clock_corrected(seconds)
 
+    async def _look_at_alarms(self) -> None:
+        """Notice alarms that come and go, until cancelled."""
+        while True:
+            self.alarms.look()
+            await asyncio.sleep(ALARMS_EVERY)
+
     # Rounds ---------------------------------------------------------------------------------------------------------
 
     async def _rounds(self) -> None:
@@ -259,6 +274,7 @@ class Coordinator:
             planned = None if stopped else self._planned(now_ticks)
             if planned is not None:
                 self.round_number += 1
+                self.planned = planned
                 self.firing.begin(planned)
             if not stopped:
                 self.firing.begin_streams()
@@ -311,6 +327,18 @@ class Coordinator:
             self._stations.solved(answer)
             self.firing.fitted(answer.used, answer.rejected)
 
+    def next_shots(self, count: int) -> Iterator[PlannedShot]:
+        """Next planned shots of each ranger that can fire, at most so many each."""
+        now_ticks = ticks_now(self.clock)
+        shots = {} if self.planned is None or self.mode != "active" else self.planned.shots
+        for ranger, planned in shots.items():
+            if ranger in self.links and ranger not in self.firing.dropped and ranger not in self.firing.streams:
+                yield from islice((shot for shot in planned if shot.begin_ticks >= now_ticks), count)
+
+    def sun_zone(self) -> SunZone:
+        """The Sun over the site now."""
+        return self._guard.sun_zone(ticks_now(self.clock))
+
     # Input --------------------------------------------------------------------------------------------------
 
     @property
@@ -359,12 +387,13 @@ class Coordinator:
         self.mode = mode
         for name, link in self.links.items():
             link.wanted = "hold" if name in self.firing.dropped and mode == "active" else LINK_STATES[mode]
-        self._event_log.tell("mode", f"mode is {mode}", always=True)
+        self._event_log.tell("mode", f"mode is {mode}", always=True, mode=mode)
 
     def leased(self, before: str, holder: str) -> None:
         """Log a new holder of the coordinator's lease."""
         self.condition.holder = holder
-        self._event_log.tell("lease", f"the coordinator's lease passes from {before} to {holder}", always=True)
+        text = f"the coordinator's lease passes from {before} to {holder}"
+        self._event_log.tell("lease", text, always=True, holder=holder)
 
     def drop(self, ranger: str) -> None:
         """Exclude a ranger; it stays connected.

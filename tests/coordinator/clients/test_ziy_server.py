@@ -3,16 +3,18 @@
 import asyncio
 import random
 
+import numpy as np
 import pytest
 
 from catseye.coordinator.clients.board import HELP
 from catseye.coordinator.clients.samplers import COLUMNS, RING_LENGTH, Samplers
 from catseye.coordinator.clients.server import KINDS, MOST_CLIENTS, MOST_UNSENT, ZiyServer
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
+from catseye.coordinator.parts import ticks_now
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
 from catseye.ranger.door import Door
-from catseye.ranger.line import LONGEST_REQUEST, parse_reply
+from catseye.ranger.line import LONGEST_REQUEST, parse_reply, parse_stamp
 from catseye.ranger.server import LOOPBACK
 from catseye.records.night.live import Happening, LivePosture, LiveShot
 from coordinator.link_scene import network, run, until
@@ -98,14 +100,14 @@ def test_rangers_and_status_report_the_condition():
             assert set(rows) == set(site.names)
             link = site.ziy.links["ZY101"]
             link_status = site.ziy.firing.last_status["ZY101"]
-            assert rows["ZY101"] == ("ZY101", "ready", str(link.shots), "0", "none", link_status, "none")
+            assert rows["ZY101"] == ("ZY101", "ready", str(link.shots), "0", "none", link_status, "none", "measures")
             status = (await client.ask("STATUS")).values
             assert status[:2] == ("active", "2 of 2")
             assert int(status[2]) == site.ziy.intake.numbered
             await site.served["ZY102"].stop()
             await until(lambda: site.ziy.links["ZY102"].state == "down")
             rows = {reply.values[0]: reply.values for reply in await client.ask_all("RANGERS")}
-            assert (rows["ZY102"][1], rows["ZY102"][-1]) == ("down", "lost")
+            assert (rows["ZY102"][1], *rows["ZY102"][-2:]) == ("down", "lost", "not connected")
             assert (await client.ask("STATUS")).values[1] == "1 of 2"
 
     run(story)
@@ -294,8 +296,8 @@ def test_samplers_keep_the_last_values_with_their_times():
     samplers.add(Happening(1, "ZY101", "lost", "gone, for good\n", "alarm"))
     assert samplers.last("EVENTS", 1)[0][1:] == ("alarm", "ZY101", "lost", "gone; for good?")
     samplers.add(EpochSolution.of(7, Answer(3, 7, used=(1, 2))))
-    assert samplers.last("EPOCHS", 1)[0][1:] == ("3", "1", "2", "0", "1.1", "none", "none")
-    assert samplers.last("POINTS", 1)[0][1:] == ("3", "ZG11", "1.0", "2.0", "3.0")
+    assert samplers.last("EPOCHS", 1)[0][1:] == ("3", "1", "2", "0", "1.1", *["none"] * 4, "good")
+    assert samplers.last("POINTS", 1)[0][1:] == ("3", "ZG11", "1.0", "2.0", "3.0", *["none"] * 7)
     for name, columns in COLUMNS.items():
         for row in samplers.last(name, 1):
             assert len(row) == len(columns) + 1
@@ -432,3 +434,75 @@ def test_real_socket_works_and_an_occupied_port_is_refused_in_one_line():
             await server.stop()
 
     asyncio.run(asyncio.wait_for(story(), 30.0))
+
+
+def test_points_have_their_covariance_and_shots():
+    samplers = Samplers()
+    matrix = np.arange(36.0).reshape(6, 6) + np.arange(36.0).reshape(6, 6).T
+    answer = {"number": 4, "names": ["A", "B"], "x": [[1.0, 2.0, 3.0], [4.0, 5.0, None]], "shots": [7, 0]}
+    samplers.add(EpochSolution(7, answer, matrix))
+    one, two = samplers.last("POINTS", 9)
+    assert dict(zip(COLUMNS["POINTS"], one[1:], strict=True)) == {
+        **{"epoch": "4", "point": "A", "x_m": "1.0", "y_m": "2.0", "z_m": "3.0", "used": "7"},
+        **{"xx_m2": "0.0", "xy_m2": "7.0", "xz_m2": "14.0", "yy_m2": "14.0", "yz_m2": "21.0", "zz_m2": "28.0"},
+    }
+    assert (two[5], two[6], two[-1]) == ("none", repr(float(matrix[3, 3])), "0")
+    samplers.add(EpochSolution(8, {"number": 5, "names": ["A"], "x": [[1.0, 2.0, 3.0]]}))
+    assert samplers.last("POINTS", 1)[0][6:] == ("none",) * 7
+
+
+def test_plan_names_the_next_shots_of_each_ranger():
+    async def story():
+        async with Served() as site:
+            client = await site.client()
+            await until(lambda: list(site.ziy.next_shots(1)))
+            rows = [reply.values for reply in await client.ask_all("PLAN", "2")]
+            assert {row[0] for row in rows} <= set(site.names)
+            assert all(parse_stamp(row[1]) > ticks_now(site.ziy.clock) - 200 for row in rows)
+            assert {row[2] for row in rows} <= {"ZRG", "ZG11", "ZG12"}
+            assert rows[0][3:] == ("0.128", "a test")
+            assert (await client.ask("PLAN", "0")).ok is False
+            site.ziy.set_mode("hold")
+            assert not list(site.ziy.next_shots(1))
+
+    run(story)
+
+
+def test_sun_and_its_cone_are_named():
+    async def story():
+        async with Served(mode="hold", ready=False) as site:
+            client = await site.client()
+            assert (await client.ask("SUN")).values == ("1.0", "0.5", "0.1", "avoided")
+
+    run(story)
+
+
+def test_alarms_are_acknowledged_and_shelved_by_name_without_the_lease():
+    async def story():
+        async with Served(mode="hold", ready=False) as site:
+            client, other = await site.client(), await site.client()
+            assert (await other.ask("LEASE", "ben")).ok
+            await asyncio.sleep(1.5)
+
+            async def alarm():
+                rows = {r.values[0]: r.values for r in await client.ask_all("ALARMS")}
+                return rows["mode"]
+
+            first = await alarm()
+            assert first[1] == "warning"
+            assert first[3:] == ("none", "none", "none", "none", "mode hold: no shots are taken")
+            assert (await client.ask("ACK", "mode", "anna")).values == ("mode", "anna")
+            assert (await client.ask("SHELVE", "mode", "2", "anna")).ok
+            now = await alarm()
+            assert (now[3], now[5]) == ("anna", "anna")
+            minutes = (parse_stamp(now[6]) - ticks_now(site.ziy.clock)) * 864e-6 / 60.0
+            assert minutes == pytest.approx(2.0, abs=0.01)
+            assert (await client.ask("UNSHELVE", "mode", "anna")).ok
+            for wrong in (("ACK", "nothing", "anna"), ("ACK", "mode", "1"), ("SHELVE", "mode", "soon", "anna")):
+                assert (await client.ask(*wrong)).ok is False
+            assert (await client.ask("LEASE")).values[0] == "ben"
+            events = [(e.kind, e.details.get("by")) for e in site.published if getattr(e, "who", "") == "alarms"]
+            assert events == [("acknowledged", "anna"), ("shelved", "anna"), ("unshelved", "anna")]
+            assert site.kinds().count("shelved") == 1
+
+    run(story)

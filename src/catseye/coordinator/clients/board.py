@@ -7,9 +7,10 @@ from catseye.coordinator.clients.samplers import COLUMNS, RING_LENGTH, Samplers,
 from catseye.coordinator.modes import mode_of
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
-from catseye.ranger.line import Request
+from catseye.ranger.line import Request, stamp_text
 
 VERSION = "1"
+MOST_PLANNED = 100  # shots of each ranger
 Rows = Iterable[tuple[str, ...]]
 HELP = {
     "STATUS": (
@@ -17,7 +18,10 @@ HELP = {
         "mode; rangers ready; shots numbered; shots acknowledged; round; telescope; journal; site; last epoch; clock; "
         "disk; holder of the lease; problems",
     ),
-    "RANGERS": ("RANGERS", "a line each: name; state; shots; failures in a row; target streamed; last status; trouble"),
+    "RANGERS": (
+        "RANGERS",
+        "a line each: name; state; shots; failures in a row; target streamed; last status; trouble; condition",
+    ),
     "PARAMETERS": ("PARAMETERS", "a line each: name; value; value that waits; legal values"),
     "SET": ("SET name, value", "check a parameter's value and store it until START"),
     "PREPARE": ("PREPARE", "check all values that wait"),
@@ -33,6 +37,12 @@ HELP = {
         "CLOCK | CLOCK ACCEPT",
         "s that its machine's UTC is ahead; kernel's state; trouble; ACCEPT adopts it",
     ),
+    "PLAN": ("PLAN | PLAN n", "the next n shots of each ranger, a line each: ranger; begin; target; s; reason"),
+    "SUN": ("SUN", "azimuth; elevation; half angle of the cone, rad; avoided, or set"),
+    "ALARMS": ("ALARMS", "a line each: id; severity; since; acknowledged by; at; shelved by; until; text"),
+    "ACK": ("ACK id, name", "acknowledge an alarm, as a person"),
+    "SHELVE": ("SHELVE id, minutes, name", "shelve an alarm for some time, as a person"),
+    "UNSHELVE": ("UNSHELVE id, name", "end an alarm's shelving, as a person"),
     "LEASE": ("LEASE | LEASE name | LEASE none", "ask the holder; take it by a name; give it back"),
     "VER": ("VER", "name and version; sent after a command of many lines it marks their end"),
     "HLP": ("HLP | HLP command", "commands, or one command's forms; HELP is the same"),
@@ -62,6 +72,12 @@ class Board:
             "TAKE": ((1,), lambda words: self._applied(coordinator.take, *words)),
             "STREAM": ((1, 2), lambda words: self._stream(*words)),
             "CLOCK": ((0, 1), lambda words: self._clock(*words)),
+            "PLAN": ((0, 1), lambda words: self._plan(*words)),
+            "SUN": ((0,), lambda _: self._sun()),
+            "ALARMS": ((0,), lambda _: self._alarms()),
+            "ACK": ((2,), lambda words: self._acknowledge(*words)),
+            "SHELVE": ((3,), lambda words: self._shelve(*words)),
+            "UNSHELVE": ((2,), lambda words: self._unshelve(*words)),
             "VER": ((0,), lambda _: [("ZIY", VERSION)]),
             "HLP": ((0, 1), lambda words: self._help(*words)),
         }
@@ -95,10 +111,50 @@ class Board:
 
     def _rangers(self) -> Rows:
         z = self._ziy
+        conditions = z.condition.now().rangers
         for name, link in z.links.items():
             state = "dropped" if name in z.firing.dropped else link.state
             status, stream = plain(z.firing.last_status.get(name, "none")), z.firing.streams.get(name, "none")
-            yield name, state, str(link.shots), str(link.failures), stream, status, " ".join(link.troubles) or "none"
+            counts, troubles = (str(link.shots), str(link.failures)), " ".join(link.troubles) or "none"
+            yield name, state, *counts, stream, status, troubles, conditions[name]
+
+    def _plan(self, count: str = "1") -> Rows:
+        if not count.isdecimal() or not 1 <= int(count[:9]) <= MOST_PLANNED:
+            raise InputError(f"n {count[:20]!a} is not 1 to {MOST_PLANNED}")
+        return [
+            (shot.ranger, stamp_text(shot.begin_ticks), shot.target, f"{shot.duration:g}", plain(shot.reason))
+            for shot in self._ziy.next_shots(int(count))
+        ]
+
+    def _sun(self) -> Rows:
+        sun = self._ziy.sun_zone()
+        angles = (repr(round(angle, 9)) for angle in (sun.azimuth, sun.elevation, sun.cone))
+        return [(*angles, "avoided" if sun.avoided else "set")]
+
+    def _alarms(self) -> Rows:
+        for alarm in self._ziy.alarms.look():
+            shelving = alarm.shelving
+            shelved = ("none", "none") if shelving is None else (shelving.by, stamp_text(shelving.until))
+            at = stamp_text(alarm.acknowledged_at) if alarm.acknowledged_by else "none"
+            acknowledged = (alarm.acknowledged_by or "none", at)
+            first = (alarm.problem.id, alarm.problem.severity, stamp_text(alarm.since))
+            yield *first, *acknowledged, *shelved, plain(alarm.problem.text)
+
+    def _acknowledge(self, name: str, by: str) -> Rows:
+        self._ziy.alarms.acknowledge(name, by)
+        return [(name, by)]
+
+    def _shelve(self, name: str, minutes: str, by: str) -> Rows:
+        try:
+            length = float(minutes)
+        except ValueError:
+            raise InputError(f"minutes = {minutes[:20]!a} (expected a number)") from None
+        self._ziy.alarms.shelve(name, length, by)
+        return [(name, minutes, by)]
+
+    def _unshelve(self, name: str, by: str) -> Rows:
+        self._ziy.alarms.unshelve(name, by)
+        return [(name, by)]
 
     def _parameters(self) -> Rows:
         return [tuple(plain(word) for word in row) for row in self.parameters.rows()]

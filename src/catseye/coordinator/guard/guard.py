@@ -6,15 +6,17 @@ was sent. A move is checked for the whole rectangle of counts between where the 
 the telescope's posture (`telescope`).
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from catseye.aliases import Array
-from catseye.constants import DEGREE, SECONDS_PER_DAY
+from catseye.constants import DEGREE, SECONDS_PER_DAY, TWO_PI
 from catseye.coordinator.guard.memory import Memory
 from catseye.coordinator.guard.parked import AHEAD, Alarm, in_words, parked_alarms
+from catseye.coordinator.parts import SunZone
 from catseye.coordinator.plan.candidates import leaves
 from catseye.coordinator.visibility.surroundings import PERHAPS, SUN, KeepClear, Surroundings, instants, later
 from catseye.coordinator.visibility.vantage import Vantage, reflector_at, seconds_between, vantages_of
@@ -142,6 +144,16 @@ class SafetyGuard:
             since = seconds_between(posture.ticks, now_ticks)
             sun = reflector_at(self.site, posture, since).rotation.T @ sun
         return float(sun[0]), float(sun[1]), float(sun[2])
+
+    def sun_zone(self, now_ticks: int) -> SunZone:
+        """The Sun over the site, and its cone without a ranger's margins."""
+        east, north, up = self._suns_between(now_ticks, now_ticks)[0].tolist()
+        return SunZone(
+            azimuth=math.atan2(east, north) % TWO_PI,
+            elevation=math.asin(max(-1.0, min(1.0, up))),
+            cone=self.keep_clear.keep_out.sun.half_angle_deg * DEGREE,
+            avoided=self.keep_clear.counts_at(np.array([east, north, up])),
+        )
 
     def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> list[Alarm]:
         """Hazards of beams parked at counts within ten minutes, soonest first.
