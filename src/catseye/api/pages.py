@@ -126,7 +126,7 @@ def page_address(
         raise ArgumentError("page_certificate and page_key: expected both, or none", "page_certificate", "page_key")
     if not is_here(listened) and certificate is None:
         raise ArgumentError(
-            f"page_host = {listened}: other machines can reach it (expected page_certificate and page_key, or 127.0.0.1)",
+            f"page_host = {listened}: other machines can reach it (expected page_certificate and page_key)",
             *("page_host", "page_certificate", "page_key"),
         )
     token = None

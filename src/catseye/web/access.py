@@ -40,7 +40,7 @@ class AccessPolicy:
 
         A WebSocket shows its token in its first message.
         """
-        headers = {name: value for name, value in reversed(scope["headers"])}  # the first of a name counts
+        headers = dict(reversed(scope["headers"]))  # the first of a name counts
         host = headers.get(b"host", b"").decode("latin-1").lower()
         if host_name(host) not in self.names:
             return Refusal(403, "host", f"Host {host!a} is not a name of this service")

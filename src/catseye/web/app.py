@@ -12,10 +12,10 @@ from catseye.errors import ArgumentError, CatseyeError
 from catseye.web.access import AccessPolicy
 from catseye.web.answers import StaticFile, json_answer, static_files
 from catseye.web.guard import Guard
-from catseye.web.live import live_router
+from catseye.web.live import router as live_router
 from catseye.web.metrics import PageMetrics
 from catseye.web.refusals import RefusalLog, printable
-from catseye.web.routes import command_router, result_router, site_router
+from catseye.web.routes import command_router, router
 from catseye.web.subject import PageSubject
 
 API_VERSION = "1"
@@ -42,10 +42,9 @@ def routes(subject: PageSubject, policy: AccessPolicy, refusals: RefusalLog, met
         docs_url=None,
         redoc_url=None,
     )
-    app.include_router(site_router(subject, policy))
-    app.include_router(command_router(subject))
-    app.include_router(result_router(subject))
-    app.include_router(live_router(subject, policy, refusals))
+    app.state.subject, app.state.policy, app.state.refusals = subject, policy, refusals
+    for part in (router, command_router, live_router):
+        app.include_router(part)
     files = static_files()
 
     @app.get("/metrics", tags=["service"], summary="Metrics for Prometheus", response_class=Response)

@@ -10,6 +10,7 @@ from catseye.web.headers import HEADERS, NO_STORE
 from catseye.web.refusals import RefusalLog, request_words
 
 MOST_BODY = 65_536  # bytes
+MOST_HEADER = 16_384  # bytes of headers and path
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
@@ -95,7 +96,7 @@ class _Answer:
         headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
         if refusal.status == 401:
             headers.append((b"www-authenticate", b"Bearer"))
-        if refusal.status == 413:
+        if refusal.status in (413, 431):
             headers.append((b"connection", b"close"))
         await self.send({"type": "http.response.start", "status": refusal.status, "headers": headers})
         await self.send({"type": "http.response.body", "body": body})
@@ -107,7 +108,10 @@ def error_body(text: str) -> bytes:
 
 
 def declared_size(scope: Any) -> Refusal | None:
-    """Refusal of a request that announces too long a body, before it is read."""
+    """Refusal of a request with too long headers, or that announces too long a body, before it is read."""
+    size = sum(len(name) + len(value) for name, value in scope["headers"]) + len(scope["raw_path"])
+    if size + len(scope["query_string"]) > MOST_HEADER:
+        return Refusal(431, "size", f"the headers have more than {MOST_HEADER} bytes")
     for name, value in scope["headers"]:
         if name == b"content-length" and int(value) > MOST_BODY:
             return Refusal(413, "size", f"the body has {int(value)} bytes (expected {MOST_BODY} at most)")

@@ -34,26 +34,26 @@ class Closed(Exception):
         self.code, self.reason = code, reason
 
 
-def live_router(subject: PageSubject, policy: AccessPolicy, refusals: RefusalLog) -> APIRouter:
-    """Route of the WebSocket."""
-    router = APIRouter()
+router = APIRouter()
 
-    @router.websocket("/api/live")
-    async def live(websocket: WebSocket) -> None:
-        await websocket.accept()
-        try:
-            if subject.watch is None:
-                raise Closed(NOTHING_LIVE, "a result has no events")
-            client = await welcomed(websocket, subject, policy)
-            await served(websocket, subject, client)
-        except Closed as end:
-            refusals.refused("websocket", websocket.scope.get("client"), end.reason, what="WebSocket /api/live")
-            with suppress(RuntimeError, WebSocketDisconnect):
-                await websocket.close(end.code, end.reason)
-        except WebSocketDisconnect:
-            return
 
-    return router
+@router.websocket("/api/live")
+async def live(websocket: WebSocket) -> None:
+    """Serve the events to one client."""
+    subject: PageSubject = websocket.app.state.subject
+    await websocket.accept()
+    try:
+        if subject.watch is None:
+            raise Closed(NOTHING_LIVE, "a result has no events")
+        client = await welcomed(websocket, subject, websocket.app.state.policy)
+        await served(websocket, subject, client)
+    except Closed as end:
+        refusals: RefusalLog = websocket.app.state.refusals
+        refusals.refused("websocket", websocket.scope.get("client"), end.reason, what="WebSocket /api/live")
+        with suppress(RuntimeError, WebSocketDisconnect):
+            await websocket.close(end.code, end.reason)
+    except WebSocketDisconnect:
+        return
 
 
 async def welcomed(websocket: WebSocket, subject: PageSubject, policy: AccessPolicy) -> LiveClient:

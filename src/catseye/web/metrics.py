@@ -76,7 +76,9 @@ class _SiteCollector(Collector):
             return
         state, now = watch.state(), watch.now()
         yield GaugeMetricFamily("catseye_connected", "1 while the coordinator answers", float(state["connected"]))
-        yield from _gauge("catseye_state_age_seconds", "Age of the coordinator's last word", age(now, state["received"]))
+        yield from _gauge(
+            "catseye_state_age_seconds", "Age of the coordinator's last word", age(now, state["received"])
+        )
         yield from self._counts(state)
         epoch = state["epoch"] or {}
         for key, name, words in (
@@ -95,7 +97,9 @@ class _SiteCollector(Collector):
         for key, words in (("numbered", "Shots with a number"), ("acknowledged", "Shots that the journal holds")):
             if counts.get(key) is not None:
                 yield CounterMetricFamily(f"catseye_shots_{key}", words, counts[key])
-        alarms = GaugeMetricFamily("catseye_alarms", "Alarms by severity and whether shelved", labels=["severity", "shelved"])
+        alarms = GaugeMetricFamily(
+            "catseye_alarms", "Alarms by severity and whether shelved", labels=["severity", "shelved"]
+        )
         found: dict[tuple[str, str], int] = {}
         for problem in state["problems"]:
             key_ = (problem["severity"], "no" if problem["shelved_by"] is None else "yes")
@@ -122,9 +126,9 @@ class _SiteCollector(Collector):
         ages = GaugeMetricFamily("catseye_ranger_shot_age_seconds", "Age of a ranger's last shot", labels=["ranger"])
         for row in state["rangers"]:
             values = (row["shots"], row["failures"], age(now, row["mjd"]))
-            for family, value in zip((shots, failures, ages), values, strict=True):
+            for add, value in zip((shots.add_metric, failures.add_metric, ages.add_metric), values, strict=True):
                 if value is not None:
-                    family.add_metric([row["name"]], value)
+                    add([row["name"]], value)
         yield from (shots, failures, ages)
 
 

@@ -26,11 +26,11 @@ CLOSE_SECONDS = 3.0  # s until a client has answered the end of a WebSocket
 PING_SECONDS = 20.0  # s between two pings of a WebSocket, and until the answer
 MOST_CONNECTIONS = 512
 MOST_FILES = 4096  # descriptors: connections, and what the interpreter needs
-MOST_HEADER = 16_384  # bytes
+MOST_HEADER = 16_384  # bytes of headers that are not complete
 LONGEST_MESSAGE = 65_536  # bytes of a client's WebSocket message
 LONGEST_END = 1  # s from SIGTERM until answers under way are cut off
 BACKLOG = 256  # connections not yet accepted
-COMPLETE = frozenset({h11.DONE, h11.MUST_CLOSE, h11.CLOSED, h11.ERROR, h11.MIGHT_SWITCH_PROTOCOL, h11.SWITCHED_PROTOCOL})
+INCOMPLETE = frozenset({h11.IDLE, h11.SEND_BODY})  # states of a client whose request is under way
 
 
 class PageConfig(Config):
@@ -121,7 +121,7 @@ class LimitedHttp(_Unstuck, H11Protocol):
     def data_received(self, data: bytes) -> None:
         self._begun = True
         super().data_received(data)
-        if self.conn.their_state in COMPLETE:
+        if self.conn.their_state not in INCOMPLETE:
             self._end_wait()
 
     def handle_websocket_upgrade(self, event: Any) -> None:
@@ -129,13 +129,15 @@ class LimitedHttp(_Unstuck, H11Protocol):
         super().handle_websocket_upgrade(event)
 
     def on_response_complete(self) -> None:
-        self._begun = False
         super().on_response_complete()
-        if not self.transport.is_closing() and self.conn.their_state not in COMPLETE:
+        self._begun = bool(self.conn.trailing_data[0])
+        if not self.transport.is_closing() and self.conn.their_state in INCOMPLETE:
             self._wait_for_request()
 
     def send_400_response(self, msg: str) -> None:
         self.config.refusals.refused("malformed", self.client, "no valid HTTP/1.1")
+        if self.cycle is not None:
+            self.cycle.disconnected = True  # an answer to the part before is not sent any more
         headers = [*HEADERS, (b"content-type", b"application/json"), (b"connection", b"close")]
         with suppress(h11.LocalProtocolError):  # an answer is under way: it ends here
             for part in (

@@ -2,16 +2,18 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from fastapi import APIRouter, HTTPException, Path, Query, Request
 from starlette.responses import Response
 
 from catseye.errors import CatseyeError
 from catseye.web import models
-from catseye.web.access import AccessPolicy
 from catseye.web.answers import json_answer
 from catseye.web.subject import PageSubject
+
+if TYPE_CHECKING:
+    from catseye.api.watching import SiteWatch
 
 LATEST_MJD = 1e6
 LARGEST = 2**53  # integers beyond are no numbers of JSON
@@ -42,172 +44,183 @@ SeriesNames = Annotated[str, Query(min_length=1, max_length=4000, description="n
 Most = Annotated[int, Query(ge=10, le=20_000, description="values of a series")]
 
 
-def site_router(subject: PageSubject, policy: AccessPolicy) -> APIRouter:
-    """Routes that read a site or a journal."""
-    router = APIRouter(prefix="/api", tags=["site"], responses=ERRORS)
-
-    async def answer(request: Request, method: str, *arguments: Any, **named: Any) -> Response:
-        watch = subject.site()
-        return await subject.desk.answer(request, lambda: getattr(watch, method)(*arguments, **named))
-
-    @router.get("/service", tags=["service"], summary="The service", response_model=models.ServiceAnswer)
-    async def service() -> Response:
-        return json_answer(subject.to_object(needs_token=policy.exposed))
-
-    @router.get("/site", summary="Map of the site", response_model=models.SiteAnswer)
-    async def site(request: Request) -> Response:
-        return await answer(request, "site")
-
-    @router.get("/state", summary="State of the site", response_model=models.StateAnswer)
-    async def state(request: Request, at: At = None) -> Response:
-        return await answer(request, "state", at)
-
-    @router.get("/epochs", summary="Epochs", response_model=models.EpochsAnswer)
-    async def epochs(request: Request, since: Since = None, until: Until = None, limit: Limit = 200) -> Response:
-        return await answer(request, "epochs", since, until, limit)
-
-    @router.get("/epochs/{number}", summary="An epoch", response_model=models.EpochAnswer)
-    async def epoch(request: Request, number: Number) -> Response:
-        return await answer(request, "epoch", number)
-
-    @router.get(
-        "/epochs/{number}/residuals", summary="Residuals of an epoch", response_model=models.ResidualsAnswer
-    )
-    async def residuals(request: Request, number: Number) -> Response:
-        return await answer(request, "residuals", number)
-
-    @router.get("/series/names", summary="Series there are", response_model=models.SeriesNamesAnswer)
-    async def series_names(request: Request) -> Response:
-        return await answer(request, "series_names")
-
-    @router.get("/series", summary="Series over time", response_model=models.SeriesAnswer)
-    async def series(
-        request: Request, names: SeriesNames, since: Since = None, until: Until = None, most: Most = 2000
-    ) -> Response:
-        chosen = [name for name in (part.strip() for part in names.split(",")) if name]
-        return await answer(request, "series", chosen, since, until, most)
-
-    @router.get("/dropped", summary="Map of dropped channels", response_model=models.DroppedAnswer)
-    async def dropped(request: Request, since: Since = None, until: Until = None) -> Response:
-        return await answer(request, "dropped", since, until)
-
-    @router.get("/shots", summary="Shots", response_model=models.ShotsAnswer)
-    async def shots(
-        request: Request,
-        ranger: Text = None,
-        target: Text = None,
-        epoch: Integer = None,
-        status: Text = None,
-        since: Since = None,
-        until: Until = None,
-        limit: Limit = 500,
-    ) -> Response:
-        named = {"ranger": ranger, "target": target, "epoch": epoch, "status": status}
-        return await answer(request, "shots", **named, since=since, until=until, limit=limit)
-
-    @router.get("/shots/{number}", summary="A shot", response_model=models.ShotAnswer)
-    async def shot(request: Request, number: Number) -> Response:
-        return await answer(request, "shot", number)
-
-    @router.get("/shots/{number}/samples", summary="Samples of a shot", response_model=models.SamplesAnswer)
-    async def samples(request: Request, number: Number) -> Response:
-        return await answer(request, "samples", number)
-
-    @router.get("/points/{name}", summary="A point", response_model=models.PointAnswer)
-    async def point(request: Request, name: Name, since: Since = None, until: Until = None) -> Response:
-        return await answer(request, "point", name, since, until)
-
-    @router.get("/rangers/{name}", summary="A ranger", response_model=models.RangerAnswer)
-    async def ranger(request: Request, name: Name) -> Response:
-        return await answer(request, "ranger", name)
-
-    @router.get("/calibrations", summary="Calibrations", response_model=models.CalibrationsAnswer)
-    async def calibrations(request: Request) -> Response:
-        return await answer(request, "calibrations")
-
-    @router.get("/air", summary="Air along each path", response_model=models.AirAnswer)
-    async def air(request: Request, epoch: Integer = None) -> Response:
-        return await answer(request, "air", epoch)
-
-    @router.get("/comparison", summary="Two epochs compared", response_model=models.ComparisonAnswer)
-    async def comparison(
-        request: Request,
-        first: Annotated[int, Query(ge=0, le=LARGEST)],
-        second: Annotated[int, Query(ge=0, le=LARGEST)],
-    ) -> Response:
-        return await answer(request, "comparison", first, second)
-
-    @router.get("/surface", summary="Surface of an epoch", response_model=models.SurfaceAnswer)
-    async def surface(request: Request, epoch: Integer = None) -> Response:
-        return await answer(request, "surface", epoch)
-
-    @router.get("/events", summary="Events", response_model=models.EventsAnswer)
-    async def events(
-        request: Request,
-        since: Since = None,
-        until: Until = None,
-        severity: Annotated[models.Severity | None, Query(description="the least")] = None,
-        limit: Limit = 500,
-    ) -> Response:
-        return await answer(request, "events", since, until, severity, limit)
-
-    return router
+router = APIRouter(prefix="/api", responses=ERRORS)
+command_router = APIRouter(prefix="/api", tags=["commands"], responses=COMMAND_ERRORS)
 
 
-def command_router(subject: PageSubject) -> APIRouter:
-    """Routes that command a site; the guard has seen the token."""
-    router = APIRouter(prefix="/api", tags=["commands"], responses=COMMAND_ERRORS)
-
-    async def done(work: Callable[[], Awaitable[Any]]) -> Response:
-        return json_answer(await commanded(subject, work))
-
-    @router.post("/commands", summary="Command the coordinator", response_model=models.CommandAnswer)
-    async def command(body: models.CommandBody) -> Response:
-        return await done(lambda: subject.site().command(body.command, body.parameters, body.who))
-
-    @router.post("/console/{ranger}", summary="A line to a ranger", response_model=models.ConsoleAnswer)
-    async def console(ranger: Name, body: models.ConsoleBody) -> Response:
-        return await done(lambda: subject.site().console(ranger, body.line, body.who))
-
-    @router.post("/alarms/{alarm}/acknowledge", summary="Acknowledge an alarm", response_model=models.CommandAnswer)
-    async def acknowledge(alarm: Name, body: models.WhoBody) -> Response:
-        return await done(lambda: subject.site().acknowledge(alarm, body.who))
-
-    @router.post("/alarms/{alarm}/shelve", summary="Shelve an alarm", response_model=models.CommandAnswer)
-    async def shelve(alarm: Name, body: models.ShelfBody) -> Response:
-        return await done(lambda: subject.site().shelve(alarm, body.who, body.minutes))
-
-    @router.post("/alarms/{alarm}/unshelve", summary="Unshelve an alarm", response_model=models.CommandAnswer)
-    async def unshelve(alarm: Name, body: models.WhoBody) -> Response:
-        return await done(lambda: subject.site().unshelve(alarm, body.who))
-
-    return router
+async def answer(request: Request, method: str, *arguments: Any, **named: Any) -> Response:
+    """Answer with what a method of the watch gives, in a thread: it may read a journal."""
+    subject: PageSubject = request.app.state.subject
+    watch = subject.site()
+    return await subject.desk.answer(request, lambda: getattr(watch, method)(*arguments, **named))
 
 
-async def commanded(subject: PageSubject, work: Callable[[], Awaitable[Any]]) -> Any:
-    """Outcome of a command.
+async def done(request: Request, work: Callable[["SiteWatch"], Awaitable[Any]]) -> Response:
+    """Answer with the outcome of a command; the guard has seen its token.
 
     Raises HTTPException: 503 if the site is not connected or silent, 409 with its words if it refuses.
     """
-    if not subject.site().state()["connected"]:
+    watch = request.app.state.subject.site()
+    if not watch.state()["connected"]:
         raise HTTPException(503, "the site is not connected: nothing was commanded")
     try:
         async with asyncio.timeout(LONGEST_COMMAND):
-            return await work()
+            return json_answer(await work(watch))
     except TimeoutError:
         raise HTTPException(503, f"no answer within {LONGEST_COMMAND:g} s: the outcome is not known") from None
     except CatseyeError as problem:
         raise HTTPException(409, str(problem)) from problem
 
 
-def result_router(subject: PageSubject) -> APIRouter:
-    """Route of a finished result."""
-    router = APIRouter(prefix="/api", tags=["result"], responses=ERRORS)
+@router.get("/service", tags=["service"], summary="The service", response_model=models.ServiceAnswer)
+async def service(request: Request) -> Response:
+    state = request.app.state
+    return json_answer(state.subject.to_object(needs_token=state.policy.exposed))
 
-    @router.get("/report", summary="Report of a result", response_model=models.Report)
-    async def report(request: Request) -> Response:
-        if subject.report is None:
-            raise HTTPException(404, f"this page shows a {subject.kind}, not a result")
-        return await subject.desk.answer(request, lambda: subject.report)
 
-    return router
+@router.get("/site", tags=["site"], summary="Map of the site", response_model=models.SiteAnswer)
+async def site(request: Request) -> Response:
+    return await answer(request, "site")
+
+
+@router.get("/state", tags=["site"], summary="State of the site", response_model=models.StateAnswer)
+async def state(request: Request, at: At = None) -> Response:
+    return await answer(request, "state", at)
+
+
+@router.get("/epochs", tags=["site"], summary="Epochs", response_model=models.EpochsAnswer)
+async def epochs(request: Request, since: Since = None, until: Until = None, limit: Limit = 200) -> Response:
+    return await answer(request, "epochs", since, until, limit)
+
+
+@router.get("/epochs/{number}", tags=["site"], summary="An epoch", response_model=models.EpochAnswer)
+async def epoch(request: Request, number: Number) -> Response:
+    return await answer(request, "epoch", number)
+
+
+@router.get(
+    "/epochs/{number}/residuals", tags=["site"], summary="Residuals of an epoch", response_model=models.ResidualsAnswer
+)
+async def residuals(request: Request, number: Number) -> Response:
+    return await answer(request, "residuals", number)
+
+
+@router.get("/series/names", tags=["site"], summary="Series there are", response_model=models.SeriesNamesAnswer)
+async def series_names(request: Request) -> Response:
+    return await answer(request, "series_names")
+
+
+@router.get("/series", tags=["site"], summary="Series over time", response_model=models.SeriesAnswer)
+async def series(
+    request: Request, names: SeriesNames, since: Since = None, until: Until = None, most: Most = 2000
+) -> Response:
+    chosen = [name for name in (part.strip() for part in names.split(",")) if name]
+    return await answer(request, "series", chosen, since, until, most)
+
+
+@router.get("/dropped", tags=["site"], summary="Map of dropped channels", response_model=models.DroppedAnswer)
+async def dropped(request: Request, since: Since = None, until: Until = None) -> Response:
+    return await answer(request, "dropped", since, until)
+
+
+@router.get("/shots", tags=["site"], summary="Shots", response_model=models.ShotsAnswer)
+async def shots(
+    request: Request,
+    ranger: Text = None,
+    target: Text = None,
+    epoch: Integer = None,
+    status: Text = None,
+    since: Since = None,
+    until: Until = None,
+    limit: Limit = 500,
+) -> Response:
+    named = {"ranger": ranger, "target": target, "epoch": epoch, "status": status}
+    return await answer(request, "shots", **named, since=since, until=until, limit=limit)
+
+
+@router.get("/shots/{number}", tags=["site"], summary="A shot", response_model=models.ShotAnswer)
+async def shot(request: Request, number: Number) -> Response:
+    return await answer(request, "shot", number)
+
+
+@router.get("/shots/{number}/samples", tags=["site"], summary="Samples of a shot", response_model=models.SamplesAnswer)
+async def samples(request: Request, number: Number) -> Response:
+    return await answer(request, "samples", number)
+
+
+@router.get("/points/{name}", tags=["site"], summary="A point", response_model=models.PointAnswer)
+async def point(request: Request, name: Name, since: Since = None, until: Until = None) -> Response:
+    return await answer(request, "point", name, since, until)
+
+
+@router.get("/rangers/{name}", tags=["site"], summary="A ranger", response_model=models.RangerAnswer)
+async def ranger(request: Request, name: Name) -> Response:
+    return await answer(request, "ranger", name)
+
+
+@router.get("/calibrations", tags=["site"], summary="Calibrations", response_model=models.CalibrationsAnswer)
+async def calibrations(request: Request) -> Response:
+    return await answer(request, "calibrations")
+
+
+@router.get("/air", tags=["site"], summary="Air along each path", response_model=models.AirAnswer)
+async def air(request: Request, epoch: Integer = None) -> Response:
+    return await answer(request, "air", epoch)
+
+
+@router.get("/comparison", tags=["site"], summary="Two epochs compared", response_model=models.ComparisonAnswer)
+async def comparison(
+    request: Request,
+    first: Annotated[int, Query(ge=0, le=LARGEST)],
+    second: Annotated[int, Query(ge=0, le=LARGEST)],
+) -> Response:
+    return await answer(request, "comparison", first, second)
+
+
+@router.get("/surface", tags=["site"], summary="Surface of an epoch", response_model=models.SurfaceAnswer)
+async def surface(request: Request, epoch: Integer = None) -> Response:
+    return await answer(request, "surface", epoch)
+
+
+@router.get("/events", tags=["site"], summary="Events", response_model=models.EventsAnswer)
+async def events(
+    request: Request,
+    since: Since = None,
+    until: Until = None,
+    severity: Annotated[models.Severity | None, Query(description="the least")] = None,
+    limit: Limit = 500,
+) -> Response:
+    return await answer(request, "events", since, until, severity, limit)
+
+
+@router.get("/report", tags=["result"], summary="Report of a result", response_model=models.Report)
+async def report(request: Request) -> Response:
+    subject: PageSubject = request.app.state.subject
+    if subject.report is None:
+        raise HTTPException(404, f"this page shows a {subject.kind}, not a result")
+    return await subject.desk.answer(request, lambda: subject.report)
+
+
+@command_router.post("/commands", summary="Command the coordinator", response_model=models.CommandAnswer)
+async def command(request: Request, body: models.CommandBody) -> Response:
+    return await done(request, lambda watch: watch.command(body.command, body.parameters, body.who))
+
+
+@command_router.post("/console/{ranger}", summary="A line to a ranger", response_model=models.ConsoleAnswer)
+async def console(request: Request, ranger: Name, body: models.ConsoleBody) -> Response:
+    return await done(request, lambda watch: watch.console(ranger, body.line, body.who))
+
+
+@command_router.post("/alarms/{alarm}/acknowledge", summary="Acknowledge an alarm", response_model=models.CommandAnswer)
+async def acknowledge(request: Request, alarm: Name, body: models.WhoBody) -> Response:
+    return await done(request, lambda watch: watch.acknowledge(alarm, body.who))
+
+
+@command_router.post("/alarms/{alarm}/shelve", summary="Shelve an alarm", response_model=models.CommandAnswer)
+async def shelve(request: Request, alarm: Name, body: models.ShelfBody) -> Response:
+    return await done(request, lambda watch: watch.shelve(alarm, body.who, body.minutes))
+
+
+@command_router.post("/alarms/{alarm}/unshelve", summary="Unshelve an alarm", response_model=models.CommandAnswer)
+async def unshelve(request: Request, alarm: Name, body: models.WhoBody) -> Response:
+    return await done(request, lambda watch: watch.unshelve(alarm, body.who))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from catseye.errors import InputError
 from catseye.web.access import LOOPBACK_NAMES, AccessPolicy
 from catseye.web.app import application
-from catseye.web.protocols import BACKLOG, PageConfig, PageServer
+from catseye.web.protocols import PageConfig, PageServer
 from catseye.web.refusals import RefusalLog
 from catseye.web.subject import PageSubject, subject_of
 
@@ -34,38 +34,54 @@ def run(settings: "PageSettings") -> None:
     with listening_socket(*settings.listen) as listener:
         subject = subject_of(settings)
         try:
-            asyncio.run(serve(settings, subject, listener))
+            asyncio.run(_run(settings, subject, listener))
         finally:
             subject.desk.close()
 
 
-async def serve(settings: "PageSettings", subject: PageSubject, listener: socket.socket) -> None:
-    """Serve a subject on a socket until standard input ends or a signal comes."""
-    refusals = RefusalLog()
+async def _run(settings: "PageSettings", subject: PageSubject, listener: socket.socket) -> None:
+    refusals, ending = RefusalLog(), asyncio.Event()
     logging.basicConfig(handlers=[OneLineHandler(refusals)], level=logging.WARNING, force=True)
-    policy = policy_of(settings, subject)
-    config = PageConfig(
-        application(subject, policy, refusals), refusals, certificate=settings.certificate, key=settings.key
-    )
-    host, port = listener.getsockname()[:2]
-    server = PageServer(config, lambda: print(json.dumps({"listening": [host, port]}), flush=True))  # noqa: T201
     loop = asyncio.get_running_loop()
-    end_with_stdin(lambda: loop.call_soon_threadsafe(setattr, server, "should_exit", True))
-    if subject.watch is None:
-        await server.serve([listener])
-        return
-    subject.watch.listeners.append(subject.feed.publish)
-    watching = asyncio.ensure_future(subject.watch.run())
-    serving = asyncio.ensure_future(server.serve([listener]))
+    end_with_stdin(lambda: loop.call_soon_threadsafe(ending.set))
+
+    def listening() -> None:
+        sys.stdout.write(json.dumps({"listening": listener.getsockname()[:2]}) + "\n")
+        sys.stdout.flush()
+
+    await serve(settings, subject, listener, refusals=refusals, listening=listening, ending=ending)
+
+
+async def serve(
+    settings: "PageSettings",
+    subject: PageSubject,
+    listener: socket.socket,
+    *,
+    refusals: RefusalLog,
+    listening: Callable[[], None],
+    ending: asyncio.Event,
+) -> None:
+    """Serve a subject on a bound socket.
+
+    listening   called once when clients can connect
+    ending      ends it, as do SIGINT and SIGTERM
+    """
+    app = application(subject, policy_of(settings, subject), refusals)
+    config = PageConfig(app, refusals, certificate=settings.certificate, key=settings.key)
+    server = PageServer(config, listening)
+    parts = [asyncio.ensure_future(server.serve([listener])), asyncio.ensure_future(ending.wait())]
+    if subject.watch is not None:
+        subject.watch.listeners.append(subject.feed.publish)
+        parts.append(asyncio.ensure_future(subject.watch.run()))
     try:
-        await asyncio.wait([watching, serving], return_when=asyncio.FIRST_COMPLETED)
-        for task in (watching, serving):
-            if task.done():
-                task.result()
+        done, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
+        for part in done:
+            part.result()
     finally:
-        watching.cancel()
         server.should_exit = True
-        await asyncio.gather(watching, serving, return_exceptions=True)
+        for part in parts[1:]:
+            part.cancel()
+        await asyncio.gather(*parts, return_exceptions=True)
 
 
 def policy_of(settings: "PageSettings", subject: PageSubject) -> AccessPolicy:

@@ -13,7 +13,7 @@ from catseye.cli.option_groups import grouped
 
 @app.command(epilog="\b\nExample: catseye serve gbt --twin --journal site.db\nAs a service: examples/systemd")
 @grouped
-def serve(
+def serve(  # noqa: PLR0913 - its options are its command line
     *,
     site: Site,
     twin: Annotated[bool, typer.Option("--twin", help="Simulated rangers, in a process that is kept alive.")] = False,

@@ -15,7 +15,8 @@ from catseye.cli.option_groups import grouped
 def view(
     *,
     source: Annotated[
-        str, typer.Argument(metavar="RESULT|JOURNAL", help="Directory or report of a result, or a journal's file or URL.")
+        str,
+        typer.Argument(metavar="RESULT|JOURNAL", help="Directory or report of a result, or a journal."),
     ],
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser, where there is one.")] = True,
     page: PageOptions,

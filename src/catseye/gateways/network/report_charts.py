@@ -5,7 +5,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.gateways.writers.report import Axis, Beams, Chart, ChartBlock, Coloured, Scene, SceneBlock, Text, categories
+from catseye.gateways.writers.report import (
+    Axis,
+    Beams,
+    Chart,
+    ChartBlock,
+    Scene,
+    SceneBlock,
+    Text,
+    categories,
+)
 from catseye.reduction.network.adjusted import AdjustedNetwork
 from catseye.reduction.network.comparison import UNTESTED, ComparedEpochs
 
