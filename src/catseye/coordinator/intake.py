@@ -21,6 +21,7 @@ from catseye.coordinator.journal.entries import (
     Entry,
     EpochSolution,
     SentCommand,
+    ranges_document,
 )
 from catseye.coordinator.journal.protocol import JournalWriter, NotDurable
 from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, ticks_now
@@ -145,7 +146,8 @@ class Intake:
         self.flush()
         stale = corrections != self._corrections
         answer = None if stale else self._live.accept(job, epoch)
-        self._write((EpochSolution.of(ticks, answer),))
+        ranges = ranges_document(ticks, answer)
+        self._write((EpochSolution.of(ticks, answer), *(() if ranges is None else (ranges,))))
         if answer is None:
             why = "the clock was corrected meanwhile" if stale else self._live.failed
             self._event_log.tell("not-solved", f"the epoch was not solved: {why}", "warning" if stale else "alarm")

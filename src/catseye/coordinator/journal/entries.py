@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 NAN = float("nan")
 EPOCH_START = "epoch-begun"  # name of the document that marks when an epoch's shots were taken out
+EPOCH_RANGES = "epoch-ranges"  # of the one behind a solution: its ranges with residuals and corrections
 CLOCK_CORRECTED = "clock-corrected"  # of the one that marks a correction of the count of UTC, and its size
 
 
@@ -120,13 +121,14 @@ class EpochSolution:
     def of(cls, ticks: int, answer: object) -> "EpochSolution":
         """Solution from an epoch answer: any dataclass or mapping, or None.
 
-        Its matrix `covariance` is stored separately, bit for bit.
+        Its matrix `covariance` is stored separately, bit for bit; its `ranges` are a document of their own.
 
         Raises InputError for a value that JSON cannot hold.
         """
         if answer is None:
             return cls(ticks, {})
         values = dict(answer) if isinstance(answer, Mapping) else named_fields(answer)
+        values.pop("ranges", None)
         matrix = values.get("covariance")
         if isinstance(matrix, np.ndarray) and matrix.ndim == 2:
             del values["covariance"]
@@ -139,6 +141,14 @@ class EpochSolution:
     def text(self) -> str:
         """The answer as JSON, keys sorted; equal texts are equal bits."""
         return json.dumps(self.answer, sort_keys=True, allow_nan=False, ensure_ascii=False)
+
+
+def ranges_document(ticks: int, answer: object) -> "Document | None":
+    """Document of an epoch's ranges; None for an answer without them."""
+    ranges = getattr(answer, "ranges", None)
+    if not ranges:
+        return None
+    return Document(ticks, EPOCH_RANGES, json.dumps(plain(ranges, EPOCH_RANGES), allow_nan=False))
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.live.epoch import Epoch, frames_of_points, observed_site, solve_epoch
 from catseye.reduction.live.jitter import Jitter
 from catseye.reduction.live.pose import LivePose, live_pose
+from catseye.reduction.live.ranges import RangeColumns, range_columns
 from catseye.reduction.live.repeats import joined_repeats
 from catseye.reduction.live.shots import PhasedShot, RangerHistory, ShotAnswer, SolvedLine, answer, phased
 from catseye.reduction.live.state import (
@@ -108,6 +109,7 @@ class EpochAnswer:
     doubts        reasons why the answer is doubtful, a sentence each; none of a good one
     biases        station: suspected bias of its thermometer; stations that are not used at all are absent
     returned      biased periods of stations, recognised since the last epoch as having ended
+    ranges        columns of the epoch's ranges, see `range_columns`; journalled beside the answer
     """
 
     number: int
@@ -131,6 +133,7 @@ class EpochAnswer:
     doubts: tuple[str, ...] = ()
     biases: Mapping[str, SuspectedBias] = field(default_factory=dict)
     returned: tuple[BiasedPeriod, ...] = ()
+    ranges: RangeColumns = field(default_factory=dict)
 
     def point(self, name: str) -> tuple[Array, Array]:
         """Position (3,) m of a point, and covariance (3, 3).
@@ -430,6 +433,7 @@ class Live:
             doubts=coordinates.doubts,
             biases=epoch.biases,
             returned=self._returned(),
+            ranges=range_columns(ranges, rows),
         )
 
     def _suspect(self, epoch: Epoch) -> None:

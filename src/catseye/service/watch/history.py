@@ -2,7 +2,8 @@
 
 import json
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from catseye.service.watch.entries import (
     numbers,
     words,
 )
-from catseye.service.watch.index import JournalIndex, Stretch, first_seq, limits
+from catseye.service.watch.index import JournalIndex, Stretch, ends_of, first_seq, limits
 from catseye.service.watch.site_map import SiteMap
 
 SEVERITIES = ("debug", "note", "warning", "alarm")
@@ -37,6 +38,12 @@ WORDS = {"good": "well", "doubtful": "impaired", "failed": "alarm"}  # site's wo
 SOLUTIONS = text(
     "SELECT seq, ticks, answer FROM solutions WHERE run = :run AND seq >= :low AND seq < :high "
     "ORDER BY seq DESC LIMIT :limit"
+)
+ONE_SOLUTION = text("SELECT ticks, answer FROM solutions WHERE run = :run AND seq = :seq")
+SEQS = text("SELECT seq FROM solutions WHERE run = :run AND seq >= :low AND seq < :high ORDER BY seq")
+PIECE = text(
+    "SELECT size, substr(covariance, 1 + 8 * (size * :row + :row), 8 * (2 * size + 3)) AS part FROM solutions "
+    "WHERE run = :run AND seq = :seq"
 )
 SOLUTION = text("SELECT ticks, answer, size, covariance FROM solutions WHERE run = :run AND seq = :seq")
 EVENTS = "SELECT ticks, severity, who, kind, text FROM happenings WHERE run = :run AND seq >= :low AND seq < :high "
@@ -55,6 +62,9 @@ LAST_WEATHER = text(
     "SELECT ticks, station, temperature_c, pressure_hpa, humidity_percent FROM weather "
     "WHERE run = :run AND seq < :high ORDER BY seq DESC LIMIT 300"
 )
+
+
+PointRow = tuple[float, Sequence[float], Sequence[Any], Sequence[Any], int]
 
 
 class History:
@@ -123,13 +133,58 @@ class History:
         key = run, seq
         if key not in self._summaries:
             solution = EpochSolution(ticks, answer_of(answer))
-            self._summaries[key] = (epoch_summary(solution) | {"run": run}) if solution.answer else None
+            self._summaries[key] = (epoch_summary(solution) | {"run": run, "seq": seq}) if solution.answer else None
             if len(self._summaries) > MOST_SUMMARIES:
                 self._summaries.popitem(last=False)
         return self._summaries[key]
 
-    def solution(self, number: int, *, run: int | None = None, at: float | None = None) -> tuple[int, EpochSolution]:
-        """Solution of an epoch and its run.
+    def spread_epochs(
+        self, since: float | None, until: float | None, most: int
+    ) -> Iterator[tuple[Object, Callable[[], Any]]]:
+        """Epochs of a span, oldest first: summary, and its answer when called; at even distances if there are more."""
+        low, high = limits(since, until)
+        seqs: list[tuple[Stretch, int]] = []
+        for stretch in reversed(list(self.index.stretches("solutions", since, until))):
+            with stretch.part.reading() as connection:
+                span = {"run": stretch.run, "low": stretch.low, "high": stretch.high}
+                seqs += [(stretch, int(row[0])) for row in connection.execute(SEQS, span)]
+        step = max(1, -(-len(seqs) // most))
+        for stretch, seq in seqs[::-1][::step][::-1]:
+            with stretch.part.reading() as connection:
+                row = connection.execute(ONE_SOLUTION, {"run": stretch.run, "seq": seq}).first()
+            if row is None or not low <= row.ticks <= high:
+                continue
+            summary = self._summary(stretch.run, seq, row.ticks, row.answer)
+            if summary is not None:
+                yield summary, partial(answer_of, row.answer)
+
+    def point_rows(self, name: str, since: float | None, until: float | None, most: int) -> Iterator[PointRow]:
+        """MJD, place, u and covariance of a point at each epoch that has it, oldest first, and the epoch's number."""
+        for summary, answer in self.spread_epochs(since, until, most):
+            stored = answer()
+            names = stored.get("names") or ()
+            if name not in names:
+                continue
+            row = names.index(name)
+            triangle = self._triangle(summary["run"], summary["seq"], row)
+            u = [None if triangle[k] is None else float(np.sqrt(max(triangle[k], 0.0))) for k in (0, 3, 5)]
+            yield summary["mjd"], stored["x"][row], u, triangle, summary["number"]
+
+    def _triangle(self, run: int, seq: int, row: int) -> list[Any]:
+        """Covariance of one point of a solution: six numbers, read without the rest of the matrix."""
+        for part in self.index.parts(run):
+            with part.reading() as connection:
+                piece = connection.execute(PIECE, {"run": run, "seq": seq, "row": 3 * row}).first()
+            if piece is not None and piece.size and piece.part is not None:
+                cells = np.frombuffer(bytes(piece.part), dtype="<f8")
+                if len(cells) == 2 * piece.size + 3:
+                    return [float(cells[i * piece.size + j]) for i in range(3) for j in range(i, 3)]
+        return [None] * 6
+
+    def solution(
+        self, number: int, *, run: int | None = None, at: float | None = None
+    ) -> tuple[int, int, EpochSolution]:
+        """Run, seq and solution of an epoch.
 
         Raises InputError for an unknown epoch.
         """
@@ -142,17 +197,16 @@ class History:
                 matrix = None
                 if row.covariance is not None and len(row.covariance) == 8 * row.size**2:
                     matrix = np.frombuffer(row.covariance, dtype="<f8").reshape(row.size, row.size)
-                return which, EpochSolution(row.ticks, answer_of(row.answer), matrix)
+                return which, int(seq or 0), EpochSolution(row.ticks, answer_of(row.answer), matrix)
         raise InputError(f"epoch {number} is not in run {which} of the journal (expected one of its epochs)")
 
     def _seq_of_epoch(self, connection: Any, run: int, number: int) -> int | None:
         """Seq of the solution with a number; those without an answer have none."""
         query = text("SELECT seq, ticks, answer FROM solutions WHERE run = :run AND seq >= :seq ORDER BY seq LIMIT 1")
-        low, high = 0, 2**62
-        last = connection.execute(
-            text("SELECT seq FROM solutions WHERE run = :run ORDER BY seq DESC LIMIT 1"), {"run": run}
-        ).scalar()
-        high = int(last or 0) + 1
+        ends = ends_of(connection, "solutions", run)
+        if ends is None:
+            return None
+        low, high = ends[0], ends[1] + 1
         while low < high:
             middle, row = (low + high) // 2, None
             start = middle
@@ -200,7 +254,7 @@ class History:
         run = self.index.run(at=at)
         parts = tuple(reversed(self.index.parts(run.run)))
         last = self._last_shots(run.run, parts, site.site.rangers, ticks)
-        posture, weather = self._surroundings(run.run, parts, ticks)
+        posture, weather = self.surroundings(run.run, parts, ticks)
         epoch = next(iter(self.latest_epochs(mjd_of(run.started), at, 1)), None)
         mode, holder = self._mode(run.run, parts, ticks)
         newest = max((shot["mjd"] for shot in last.values()), default=None)
@@ -253,7 +307,7 @@ class History:
                 break
         return last
 
-    def _surroundings(self, run: int, parts: Sequence[Any], ticks: int) -> tuple[Object | None, list[Object]]:
+    def surroundings(self, run: int, parts: Sequence[Any], ticks: int) -> tuple[Object | None, list[Object]]:
         """Last posture, and each station's last reading, up to an instant."""
         posture: Object | None = None
         weather: dict[str, Object] = {}

@@ -1,9 +1,9 @@
 """Watch of a site: live state from the coordinator's port, everything else from the journal."""
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from catseye.clock import Clock, SystemClock
 from catseye.coordinator.parts import ticks_now
@@ -11,13 +11,17 @@ from catseye.errors import InputError
 from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import SiteFolder
-from catseye.service.watch.entries import Object
-from catseye.service.watch.history import History
+from catseye.service.watch.entries import EVENT, SHOT, Object, rows_to_columns
+from catseye.service.watch.history import History, least_severities, require_limit
 from catseye.service.watch.port import SitePort
 from catseye.service.watch.site_map import SiteMap
 
+if TYPE_CHECKING:
+    from catseye.service.watch.epochs import EpochRecord
+
 Address = tuple[str, int]
 Listener = Callable[[str, Object], None]
+MOST_BEAMS = 5000
 HISTORY_PERIOD = 1.0  # s between two states of a journal that is watched without a port
 
 
@@ -117,13 +121,129 @@ class SiteWatch:
         """State of the site: live, or of the journal at an MJD."""
         if at is None and self.port is not None:
             return self.port.state()
-        return self._journal().state(self.now() if at is None else at, self.map) | {"received": self.now()}
+        return self._journal().state(self._instant(at), self.map) | {"received": self.now()}
 
     def epochs(self, since: float | None = None, until: float | None = None, limit: int = 200) -> Object:
         """Summaries of epochs, oldest first, at most `limit` of the latest."""
         if self._place is not None:
             return self._journal().epochs(since, until, limit)
         return {"epochs": _within(list(self._past.epochs), since, until, limit)}
+
+    def epoch(self, number: int, run: int | None = None, at: float | None = None) -> Object:
+        """One epoch: points with covariance, beams, air, zeros, posed structure."""
+        if self._place is None:
+            return self._live_epoch(number)
+        from catseye.service.watch.epochs import epoch_object
+
+        return epoch_object(self._epoch(number, run, at), self.map)
+
+    def residuals(self, number: int, run: int | None = None, at: float | None = None) -> Object:
+        """Residual of each shot of an epoch."""
+        from catseye.service.watch.epochs import residuals_object
+
+        return residuals_object(self._epoch(number, run, at), self.map)
+
+    def air(self, epoch: int | None = None, run: int | None = None, at: float | None = None) -> Object:
+        """Air along the paths of an epoch, the last if None."""
+        from catseye.service.watch.epochs import air_object
+
+        history = self._journal()
+        record = self._epoch(self._last_epoch(at) if epoch is None else epoch, run, at)
+        parts = tuple(reversed(history.index.parts(record.run)))
+        return air_object(record, self.map, history.surroundings(record.run, parts, record.solution.ticks)[1])
+
+    def surface(self, epoch: int | None = None, run: int | None = None, at: float | None = None) -> Object:
+        """Shape of the dish by the prisms of an epoch, the last if None."""
+        from catseye.service.watch.epochs import surface_object
+
+        return surface_object(self._epoch(self._last_epoch(at) if epoch is None else epoch, run, at), self.map)
+
+    def comparison(self, first: int, second: int, run: int | None = None, at: float | None = None) -> Object:
+        """Movement of the points that two epochs of a run share."""
+        from catseye.service.watch.epochs import comparison_object
+
+        return comparison_object(self._epoch(first, run, at), self._epoch(second, run, at), self.map)
+
+    def series(
+        self, names: Sequence[str], since: float | None = None, until: float | None = None, most: int = 2000
+    ) -> Object:
+        """Series by name, at most `most` values or bins each."""
+        from catseye.service.watch.series import series_object
+
+        return series_object(self._journal(), names, since, until, most)
+
+    def series_names(self) -> Object:
+        """Names of all series with labels and units."""
+        from catseye.service.watch.series import series_names
+
+        return series_names(self._journal(), self.map)
+
+    def dropped(self, since: float | None = None, until: float | None = None, bins: int = 200) -> Object:
+        """Good and failed shots of each ranger in bins of time."""
+        from catseye.service.watch.series import dropped_object
+
+        return dropped_object(self._journal(), self.map, since, until, bins)
+
+    def shots(
+        self,
+        *,
+        ranger: str | None = None,
+        target: str | None = None,
+        epoch: int | None = None,
+        status: str | None = None,
+        since: float | None = None,
+        until: float | None = None,
+        limit: int = 500,
+    ) -> Object:
+        """Columns of shots, oldest first, the latest `limit` that fit."""
+        from catseye.service.watch.shots import shots_object
+
+        if self._place is None:
+            wanted = {"ranger": ranger, "target": target, "status": status}
+            chosen = {key: value for key, value in wanted.items() if value is not None}
+            rows = [shot for shot in self._past.shots() if all(shot[key] == value for key, value in chosen.items())]
+            return rows_to_columns(SHOT, _within(rows, since, until, require_limit(limit)))
+        return shots_object(
+            self._journal(),
+            ranger=ranger,
+            target=target,
+            epoch=epoch,
+            status=status,
+            since=since,
+            until=until,
+            limit=limit,
+        )
+
+    def shot(self, number: int, run: int | None = None, at: float | None = None) -> Object:
+        """One shot with the chain of numbers behind its range."""
+        from catseye.service.watch.shots import ShotRecord, shot_detail
+
+        return shot_detail(ShotRecord(self._journal(), number, run=run, at=at), self.map)
+
+    def samples(self, number: int, run: int | None = None, at: float | None = None) -> Object:
+        """Samples of a shot, spectrum, harmonics, phase of each cycle."""
+        from catseye.service.watch.shots import ShotRecord, samples_object
+
+        return samples_object(ShotRecord(self._journal(), number, run=run, at=at))
+
+    def point(self, name: str, since: float | None = None, until: float | None = None) -> Object:
+        """One point through the epochs, and its last shots."""
+        from catseye.service.watch.points import point_object
+
+        return point_object(self._journal(), self.map, name, since, until)
+
+    def ranger(self, name: str, at: float | None = None) -> Object:
+        """One ranger: state, records, certificates, last commands."""
+        from catseye.service.watch.points import ranger_object
+
+        history = None if self._place is None else self._journal()
+        return ranger_object(history, self.map, name, self.state(at), self._instant(at))
+
+    def calibrations(self, at: float | None = None) -> Object:
+        """Certificates of the site's records and their validity."""
+        from catseye.service.watch.calibrations import calibrations_object
+
+        return calibrations_object(self.map.site, self._instant(at))
 
     def events(
         self,
@@ -136,14 +256,62 @@ class SiteWatch:
 
         severity   the least: debug, note, warning or alarm
         """
-        from catseye.service.watch.entries import rows_to_columns
-        from catseye.service.watch.history import EVENT, least_severities
-
         if self._place is not None:
             return self._journal().events(since, until, severity, limit)
         chosen = least_severities(severity)
         rows = [event for event in self._past.events if event["severity"] in chosen]
         return rows_to_columns(EVENT, _within(rows, since, until, limit))
+
+    def _epoch(self, number: int, run: int | None, at: float | None) -> "EpochRecord":
+        from catseye.service.watch.epochs import EpochRecord
+
+        return EpochRecord(self._journal(), number, run=run, at=at)
+
+    def _last_epoch(self, at: float | None) -> int:
+        """Number of the last epoch at an MJD.
+
+        Raises InputError without any.
+        """
+        last = next(iter(self._journal().latest_epochs(None, at, 1)), None)
+        if last is None:
+            raise InputError("no epoch is solved yet (expected one first)")
+        return int(last["number"])
+
+    def _instant(self, at: float | None) -> float:
+        """MJD asked for; else of the site's live state, or of the journal's end."""
+        if at is not None:
+            return at
+        if self.port is not None:
+            return self.port.state()["mjd"] or self.now()
+        return self._journal().span()[1] or self.now()
+
+    def _live_epoch(self, number: int) -> Object:
+        """The last epoch from the port, where no journal is watched."""
+        points = None if self.port is None else self.port.points
+        summary = next((e for e in reversed(self._past.epochs) if e["number"] == number), None)
+        if points is None or summary is None or points["number"] != number:
+            raise InputError(f"epoch {number} is not in memory: only the last is, since no journal is watched")
+        columns = points["points"]
+        before = [e["mjd"] for e in self._past.epochs if e["mjd"] < summary["mjd"]]
+        shots = _within(list(self._past.shots()), max(before, default=None), summary["mjd"], MOST_BEAMS)
+        lines = [shot for shot in shots if shot["status"] == "used"]
+        nothing: Object = {key: {} for key in ("jitter_mm", "biases")} | {"doubts": [], "notes": [], "rejected": []}
+        return (
+            summary
+            | nothing
+            | {
+                "points": columns | {"body": [self.map.body(name) for name in columns["name"]]},
+                "beams": {
+                    **{key: [shot[key] for shot in lines] for key in ("ranger", "target")},
+                    "shot": [shot["number"] for shot in lines],
+                    "w": [None] * len(lines),
+                },
+                "structure": self.map.structure(summary["azimuth"], summary["elevation"]),
+                "air": {"name": [], "value": [], "u": []},
+                "zeros": {"ranger": [], "value": [], "u": []},
+                "pose": None,
+            }
+        )
 
     @property
     def _past(self) -> Any:
