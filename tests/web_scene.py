@@ -101,7 +101,7 @@ class MadeUpWatch:
 
     def state(self, at=None):
         if at is not None and at < 60_000.0:
-            raise InputError(f"at = {at:g} is before the history (expected {MJD:g} or later)")
+            raise ArgumentError(f"at = {at:g} is before the history (expected {MJD:g} or later)", "at")
         return {
             "mjd": self.now(),
             "received": MJD,
@@ -142,16 +142,16 @@ class MadeUpWatch:
     def epochs(self, since=None, until=None, limit=200):
         return {"epochs": [EPOCH]}
 
-    def epoch(self, number):
+    def epoch(self, number, run=None, at=None):
         self.known_epoch(number)
         places = {axis: [1.0, 2.0] for axis in "xyz"} | {"covariance": {key: [1e-9, 1e-9] for key in NUMBERS}}
         return EPOCH | {
-            "points": {"name": ["A", "B"], **places, "shots": [18, 18]},
+            "points": {"name": ["A", "B"], "body": ["dish", "dish"], **places, "shots": [18, 18]},
             "beams": {"ranger": ["ZY101"], "target": ["A"], "shot": [41], "w": [0.3]},
             "structure": self.site()["structure"],
             "air": {"name": ["mean"], "value": [252.1], "u": [0.1]},
             "zeros": {"ranger": ["ZY101"], "value": [1e-5], "u": [1e-5]},
-            "jitter_mm": 0.02,
+            "jitter_mm": {"dish": 0.02},
             "doubts": [],
             "notes": ["a note"],
             "biases": None,
@@ -163,7 +163,7 @@ class MadeUpWatch:
         if number != EPOCH["number"]:
             raise InputError(f"epoch {number} is unknown (expected 1 to 3)")
 
-    def residuals(self, number):
+    def residuals(self, number, run=None, at=None):
         self.known_epoch(number)
         numbers = {key: [0.1] for key in ("mjd", "elevation", "residual", "u", "w")}
         return {"shot": [41], "ranger": ["ZY101"], "target": ["A"], **numbers, "status": ["good"]}
@@ -173,11 +173,11 @@ class MadeUpWatch:
 
     def series(self, names, since=None, until=None, most=2000):
         if unknown := [name for name in names if name != "azimuth"]:
-            raise ArgumentError(f"names: {unknown[0]!r} is unknown (expected azimuth)", "names")
+            raise InputError(f"{unknown[0]!r} is not a series (expected azimuth)")
         line = {"name": "azimuth", "label": "azimuth", "unit": "rad", "mjd": [MJD] * most, "value": [2.5] * most}
         return {"names": [line | {"u": None, "low": None, "high": None}], "gaps": 30.0}
 
-    def dropped(self, since=None, until=None):
+    def dropped(self, since=None, until=None, bins=200):
         return {"rangers": ["ZY101"], "bins": [MJD], "good": [[3]], "failed": [[0]]}
 
     def shots(self, **chosen):
@@ -187,7 +187,7 @@ class MadeUpWatch:
         if number != SHOT["number"]:
             raise InputError(f"shot {number} is unknown (expected 1 to 42)")
 
-    def shot(self, number):
+    def shot(self, number, run=None, at=None):
         self.known_shot(number)
         return SHOT | {
             "text": "good",
@@ -206,7 +206,7 @@ class MadeUpWatch:
             },
         }
 
-    def samples(self, number):
+    def samples(self, number, run=None, at=None):
         self.known_shot(number)
         return {
             "sample_rate_hz": 1000.0,
@@ -223,27 +223,27 @@ class MadeUpWatch:
         places = {axis: [1.0] for axis in "xyz"} | {"covariance": {key: [1e-9] for key in NUMBERS}}
         return {"name": "A", "body": "dish", "mjd": [MJD], **places, "shots": SHOTS}
 
-    def ranger(self, name):
+    def ranger(self, name, at=None):
         if name != "ZY101":
             raise InputError(f"{name!r} is no ranger of the site")
         empty = {"mjd": [], "line": [], "reply": [], "ok": []}
         own = {"kind": "ground", "station": {}, "zero": None, "servo": None, "certificates": [], "commands": empty}
         return ranger_row(name) | own
 
-    def calibrations(self):
+    def calibrations(self, at=None):
         row = {"instrument": "ZY101", "kind": "oscillator", "file": "f", "sha256": "0", "valid_from": None}
         return {"instruments": [row | {"valid_until": None, "valid": True, "value": 1.0, "u": 0.1, "unit": "ppm"}]}
 
-    def air(self, epoch=None):
+    def air(self, epoch=None, run=None, at=None):
         paths = {key: [1.0] for key in ("length", "refractivity_ppm", "u", "temperature_c")}
         return {"paths": {"ranger": ["ZY101"], "target": ["A"], **paths}, "profile": None, "stations": [WEATHER]}
 
-    def comparison(self, first, second):
+    def comparison(self, first, second, run=None, at=None):
         self.known_epoch(first)
         deltas = {axis: [1e-4] for axis in ("dx", "dy", "dz")} | {"covariance": {key: [1e-9] for key in NUMBERS}}
         return {"name": ["A"], **deltas, "significant": [False], "verdict": "good"}
 
-    def surface(self, epoch=None):
+    def surface(self, epoch=None, run=None, at=None):
         return {
             "points": {"name": ["A"], "x": [1.0], "y": [2.0], "deviation": [1e-4], "u": [1e-5]},
             "actuators": None,

@@ -76,7 +76,10 @@ def test_each_route_of_the_document_is_tested(client):
         ("/api/state?at=-1", 422, "query at"),
         ("/api/epochs/three", 422, "path number"),
         ("/api/epochs?limit=0", 422, "query limit"),
-        ("/api/series?names=bogus", 422, "'bogus' is unknown"),
+        ("/api/series?names=bogus", 404, "'bogus' is not a series"),
+        ("/api/series?names=,%20,", 422, "0 names (expected 1 to 64)"),
+        ("/api/shots?since=60002&until=60001", 422, "expected an earlier and a later MJD"),
+        ("/api/air?epoch=-1", 422, "query epoch"),
         ("/api/series", 422, "query names"),
         ("/api/events?severity=loud", 422, "query severity"),
         ("/api/nothing", 404, "/api/nothing is not a path"),
@@ -116,7 +119,7 @@ def test_a_file_of_the_page_is_sent_again_only_when_it_changed(client):
 
 def test_a_nan_of_ours_is_no_answer_and_no_trace_leaves(page, client):
     class Broken(MadeUpWatch):
-        def surface(self, epoch=None):
+        def surface(self, epoch=None, run=None, at=None):
             return {"rms": float("nan")}
 
     with served_page(watch=Broken()) as broken:

@@ -72,22 +72,21 @@ def static_answer(files: dict[str, StaticFile], path: str, request: Request) -> 
 
 async def error_answer(request: Request, problem: Exception) -> Response:
     """JSON of an error in one line; nothing of a fault leaves but that there was one."""
-    status, text = status_and_text(request, problem)
+    status, text = status_and_text(problem)
     answer = json_answer({"error": printable(text)}, status)
     if isinstance(problem, AnyHttpError):
         answer.headers.update(problem.headers or {})
     return answer
 
 
-def status_and_text(request: Request, problem: Exception) -> tuple[int, str]:
+def status_and_text(problem: Exception) -> tuple[int, str]:
     """Status and line of an error."""
     if isinstance(problem, RequestValidationError):
         return 422, invalid_words(problem.errors())
     if isinstance(problem, AnyHttpError):
         return (422 if problem.status_code == BODY_INVALID else problem.status_code), str(problem.detail)
     if isinstance(problem, CatseyeError):
-        named = bool(request.path_params) and not isinstance(problem, ArgumentError)
-        return (404 if named else 422), str(problem)
+        return (422 if isinstance(problem, ArgumentError) else 404), str(problem)
     return 500, "internal error of the service; its log has a line about it"
 
 

@@ -74,7 +74,7 @@ class _SiteCollector(Collector):
         watch = self._subject.watch
         if watch is None or self._subject.kind != "site":
             return
-        state, now = watch.state(), watch.now()
+        state, now = watch.state(), self._subject.now()
         yield GaugeMetricFamily("catseye_connected", "1 while the coordinator answers", float(state["connected"]))
         yield from _gauge(
             "catseye_state_age_seconds", "Age of the coordinator's last word", age(now, state["received"])

@@ -11,6 +11,7 @@ Number = float | None
 Column = list[Number]
 Names = list[str]
 Mjd = Annotated[float, Field(description="MJD, UTC, d")]
+Verdict = Annotated[str | None, Field(description="good, doubtful or failed")]
 Severity = Literal["debug", "note", "warning", "alarm"]
 Command = Literal["MODE", "DROP", "TAKE", "STREAM", "SET", "PREPARE", "START", "CLOCK"]
 Who = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[ -~]*$", description="name of the person")]
@@ -134,11 +135,14 @@ class EpochSummaryAnswer(Shape):
     shots: int | None
     rejected: int | None
     variance_factor: Number
-    degrees_of_freedom: int | None
+    degrees_of_freedom: Number
     refractivity_ppm: Number
-    verdict: Any
+    verdict: Verdict
+    verdict_text: str | None = None
     azimuth: Number
     elevation: Number
+    run: int | None = Field(default=None, description="of the journal")
+    seq: int | None = Field(default=None, description="number of the entry in the journal")
 
 
 class PostureAnswer(Direction):
@@ -163,6 +167,7 @@ class SunAnswer(Direction):
     """Place of the Sun and half angle of the cone that is avoided, rad."""
 
     cone: Number
+    avoided: bool | None = None
 
 
 class LastShot(Shape):
@@ -189,26 +194,30 @@ class RangerRow(Shape):
     failures: int | None
     stream: Any
     last: LastShot | None
-    next: str | None
+    next: str | None = Field(description="target of the next shot")
+    next_mjd: Number = None
 
 
 class StateAnswer(Shape):
     """State of a site: live, or of the journal at an instant."""
 
-    mjd: Mjd
-    received: Number = Field(description="MJD of the coordinator's last word")
+    mjd: Number = Field(description="of the site's clock; null before its first word")
+    received: Number = Field(description="MJD of the coordinator's last word, by this machine's clock")
     source: Literal["live", "journal"]
     connected: bool
+    trouble: str | None = Field(default=None, description="why it is not connected")
     word: str | None
     mode: str | None
-    round: Any
+    round: int | None
     shots: ShotCounts | None
-    clock: Any
-    disk: Any
-    journal: Any
-    lease: Any
+    telescope: str | None = None
+    clock: str | None
+    disk: str | None
+    journal: str | None
+    lease: str | None = Field(description="name of its holder")
     problems: list[ProblemAnswer]
-    verdict: Any
+    verdict: Verdict
+    verdict_text: str | None = None
     epoch: EpochSummaryAnswer | None
     posture: PostureAnswer | None
     weather: list[WeatherAnswer]
@@ -237,6 +246,7 @@ class EpochPoints(Shape):
     """Points of an epoch, m."""
 
     name: Names
+    body: Names
     x: Column
     y: Column
     z: Column
@@ -275,6 +285,7 @@ class RejectedShot(Shape):
     shot: int | None
     ranger: str | None
     target: str | None
+    status: str | None = None
     reason: str
 
 
@@ -286,12 +297,12 @@ class EpochAnswer(EpochSummaryAnswer):
     structure: list[Outline]
     air: NamedValues
     zeros: RangerZeros
-    jitter_mm: Any
+    jitter_mm: dict[str, Number] | None
     doubts: list[str]
     notes: list[str]
-    biases: Any
+    biases: dict[str, Any] | None
     rejected: list[RejectedShot]  # type: ignore[assignment]  # the summary counts them
-    pose: Any
+    pose: dict[str, Any] | None
 
 
 class ResidualsAnswer(Shape):
@@ -306,6 +317,7 @@ class ResidualsAnswer(Shape):
     u: Column
     w: Column
     status: Names
+    by: str | None = None
 
 
 class SeriesName(Shape):
@@ -344,6 +356,7 @@ class DroppedAnswer(Shape):
 
     rangers: Names
     bins: Column
+    width: Number = Field(default=None, description="of a bin, d")
     good: list[list[int]]
     failed: list[list[int]]
 
@@ -374,14 +387,21 @@ class CertificateAnswer(Shape):
 
     instrument: str
     file: str
-    valid_from: Any
-    valid_until: Any
+    sha256: str | None = None
+    serial: str | None = None
+    measured_on: str | None = None
+    valid_from: str | None
+    valid_until: str | None
+    valid: bool | None = Field(default=None, description="at the instant of the answer")
+    by: str | None = None
+    report: str | None = None
 
 
 class ShotAnswer(Shape):
     """Shot with all that went into its range."""
 
     number: int
+    run: int | None = None
     mjd: Mjd
     ranger: str
     target: str
@@ -391,7 +411,10 @@ class ShotAnswer(Shape):
     u_range: Number
     misfit: Number
     amplitude_v: Number
-    phase: Number
+    phase: Number = Field(description="rad")
+    cycles: int | None = None
+    samples_per_cycle: int | None = None
+    if_hz: Number = None
     epoch: int | None
     correction: list[CorrectionStep]
     weather: list[WeatherAnswer]
@@ -425,12 +448,13 @@ class CyclePhase(Shape):
 class SamplesAnswer(Shape):
     """Samples of a shot and its spectrum."""
 
+    number: int | None = None
     sample_rate_hz: Number
     volts: Column
     spectrum: Spectrum
     harmonics: list[Harmonic]
     cycle_phase: CyclePhase
-    fit: Any
+    fit: dict[str, Number]
 
 
 class PointAnswer(Shape):
@@ -439,6 +463,7 @@ class PointAnswer(Shape):
     name: str
     body: str
     mjd: Column
+    epoch: list[int | None] = []
     x: Column
     y: Column
     z: Column
@@ -460,16 +485,11 @@ class RangerAnswer(BaseModel):
     commands: Any
 
 
-class InstrumentAnswer(Shape):
+class InstrumentAnswer(CertificateAnswer):
     """Calibrated instrument."""
 
-    instrument: str
     kind: str
-    file: str
-    sha256: str | None
-    valid_from: Any
-    valid_until: Any
-    valid: bool | None
+    quantity: str = ""
     value: Any
     u: Any
     unit: str | None
@@ -478,6 +498,7 @@ class InstrumentAnswer(Shape):
 class CalibrationsAnswer(Shape):
     """Calibrations behind a site's numbers."""
 
+    mjd: Number = None
     instruments: list[InstrumentAnswer]
 
 
@@ -495,8 +516,11 @@ class AirPaths(Shape):
 class AirAnswer(Shape):
     """Air of an epoch."""
 
+    epoch: int | None = None
+    mjd: Number = None
+    refractivity_ppm: Number = None
     paths: AirPaths
-    profile: Any
+    profile: dict[str, Any] | None
     stations: list[Any]
 
 
@@ -511,7 +535,7 @@ class ComparisonAnswer(BaseModel):
     dz: Column
     covariance: Covariance
     significant: list[bool | None]
-    verdict: Any
+    verdict: Verdict
 
 
 class SurfacePoints(Shape):
@@ -520,7 +544,8 @@ class SurfacePoints(Shape):
     name: Names
     x: Column
     y: Column
-    deviation: Column
+    deviation: Column = Field(description="along the normal")
+    half_path: Column = []
     u: Column
 
 
@@ -538,19 +563,32 @@ class ZernikeTerm(Shape):
 
     n: int
     m: int
+    number: int | None = None
     name: str
     value: Number
     u: Number
 
 
+class Aperture(Shape):
+    """Circle over which the Zernike polynomials are orthogonal, m."""
+
+    x: Number
+    y: Number
+    radius: Number
+
+
 class SurfaceAnswer(Shape):
     """Surface of an epoch."""
 
+    epoch: int | None = None
     points: SurfacePoints
     actuators: Actuators | None
+    aperture: Aperture | None = None
     zernike: list[ZernikeTerm]
     rms: Number
-    verdict: Any
+    focal_length: Number = None
+    verdict: Verdict
+    verdict_text: str | None = None
 
 
 class EventsAnswer(Shape):

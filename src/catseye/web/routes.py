@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from fastapi import APIRouter, HTTPException, Path, Query, Request
 from starlette.responses import Response
 
-from catseye.errors import CatseyeError
+from catseye.errors import ArgumentError, CatseyeError
 from catseye.web import models
 from catseye.web.answers import json_answer
 from catseye.web.subject import PageSubject
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 LATEST_MJD = 1e6
 LARGEST = 2**53  # integers beyond are no numbers of JSON
+MOST_NAMES = 64  # of series in an answer
 LONGEST_COMMAND = 15.0  # s until a command's outcome is unknown
 ERRORS: dict[int | str, dict[str, Any]] = {
     status: {"model": models.ErrorAnswer, "description": words}
@@ -35,7 +36,7 @@ COMMAND_ERRORS = ERRORS | {
 At = Annotated[float | None, Query(ge=0.0, le=LATEST_MJD, allow_inf_nan=False, description="MJD; none: now")]
 Since = Annotated[float | None, Query(ge=0.0, le=LATEST_MJD, allow_inf_nan=False, description="MJD of the first")]
 Until = Annotated[float | None, Query(ge=0.0, le=LATEST_MJD, allow_inf_nan=False, description="MJD of the last")]
-Limit = Annotated[int, Query(ge=1, le=5000, description="the latest of so many")]
+Limit = Annotated[int, Query(ge=1, le=20_000, description="so many of the latest")]
 Text = Annotated[str | None, Query(max_length=64)]
 Integer = Annotated[int | None, Query(ge=0, le=LARGEST)]
 Number = Annotated[int, Path(ge=0, le=LARGEST)]
@@ -52,6 +53,9 @@ async def answer(request: Request, method: str, *arguments: Any, **named: Any) -
     """Answer with what a method of the watch gives, in a thread: it may read a journal."""
     subject: PageSubject = request.app.state.subject
     watch = subject.site()
+    since, until = (request.query_params.get(name) for name in ("since", "until"))
+    if since is not None and until is not None and float(since) > float(until):
+        raise ArgumentError(f"since = {since}, until = {until} (expected an earlier and a later MJD)", "since", "until")
     return await subject.desk.answer(request, lambda: getattr(watch, method)(*arguments, **named))
 
 
@@ -94,15 +98,15 @@ async def epochs(request: Request, since: Since = None, until: Until = None, lim
 
 
 @router.get("/epochs/{number}", tags=["site"], summary="An epoch", response_model=models.EpochAnswer)
-async def epoch(request: Request, number: Number) -> Response:
-    return await answer(request, "epoch", number)
+async def epoch(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
+    return await answer(request, "epoch", number, run, at)
 
 
 @router.get(
     "/epochs/{number}/residuals", tags=["site"], summary="Residuals of an epoch", response_model=models.ResidualsAnswer
 )
-async def residuals(request: Request, number: Number) -> Response:
-    return await answer(request, "residuals", number)
+async def residuals(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
+    return await answer(request, "residuals", number, run, at)
 
 
 @router.get("/series/names", tags=["site"], summary="Series there are", response_model=models.SeriesNamesAnswer)
@@ -115,12 +119,19 @@ async def series(
     request: Request, names: SeriesNames, since: Since = None, until: Until = None, most: Most = 2000
 ) -> Response:
     chosen = [name for name in (part.strip() for part in names.split(",")) if name]
+    if not 1 <= len(chosen) <= MOST_NAMES:
+        raise ArgumentError(f"{len(chosen)} names (expected 1 to {MOST_NAMES})", "names")
     return await answer(request, "series", chosen, since, until, most)
 
 
 @router.get("/dropped", tags=["site"], summary="Map of dropped channels", response_model=models.DroppedAnswer)
-async def dropped(request: Request, since: Since = None, until: Until = None) -> Response:
-    return await answer(request, "dropped", since, until)
+async def dropped(
+    request: Request,
+    since: Since = None,
+    until: Until = None,
+    bins: Annotated[int, Query(ge=1, le=1000, description="bins of time")] = 200,
+) -> Response:
+    return await answer(request, "dropped", since, until, bins)
 
 
 @router.get("/shots", tags=["site"], summary="Shots", response_model=models.ShotsAnswer)
@@ -139,13 +150,13 @@ async def shots(
 
 
 @router.get("/shots/{number}", tags=["site"], summary="A shot", response_model=models.ShotAnswer)
-async def shot(request: Request, number: Number) -> Response:
-    return await answer(request, "shot", number)
+async def shot(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
+    return await answer(request, "shot", number, run, at)
 
 
 @router.get("/shots/{number}/samples", tags=["site"], summary="Samples of a shot", response_model=models.SamplesAnswer)
-async def samples(request: Request, number: Number) -> Response:
-    return await answer(request, "samples", number)
+async def samples(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
+    return await answer(request, "samples", number, run, at)
 
 
 @router.get("/points/{name}", tags=["site"], summary="A point", response_model=models.PointAnswer)
@@ -154,18 +165,18 @@ async def point(request: Request, name: Name, since: Since = None, until: Until 
 
 
 @router.get("/rangers/{name}", tags=["site"], summary="A ranger", response_model=models.RangerAnswer)
-async def ranger(request: Request, name: Name) -> Response:
-    return await answer(request, "ranger", name)
+async def ranger(request: Request, name: Name, at: At = None) -> Response:
+    return await answer(request, "ranger", name, at)
 
 
 @router.get("/calibrations", tags=["site"], summary="Calibrations", response_model=models.CalibrationsAnswer)
-async def calibrations(request: Request) -> Response:
-    return await answer(request, "calibrations")
+async def calibrations(request: Request, at: At = None) -> Response:
+    return await answer(request, "calibrations", at)
 
 
 @router.get("/air", tags=["site"], summary="Air along each path", response_model=models.AirAnswer)
-async def air(request: Request, epoch: Integer = None) -> Response:
-    return await answer(request, "air", epoch)
+async def air(request: Request, epoch: Integer = None, run: Integer = None, at: At = None) -> Response:
+    return await answer(request, "air", epoch, run, at)
 
 
 @router.get("/comparison", tags=["site"], summary="Two epochs compared", response_model=models.ComparisonAnswer)
@@ -173,13 +184,15 @@ async def comparison(
     request: Request,
     first: Annotated[int, Query(ge=0, le=LARGEST)],
     second: Annotated[int, Query(ge=0, le=LARGEST)],
+    run: Integer = None,
+    at: At = None,
 ) -> Response:
-    return await answer(request, "comparison", first, second)
+    return await answer(request, "comparison", first, second, run, at)
 
 
 @router.get("/surface", tags=["site"], summary="Surface of an epoch", response_model=models.SurfaceAnswer)
-async def surface(request: Request, epoch: Integer = None) -> Response:
-    return await answer(request, "surface", epoch)
+async def surface(request: Request, epoch: Integer = None, run: Integer = None, at: At = None) -> Response:
+    return await answer(request, "surface", epoch, run, at)
 
 
 @router.get("/events", tags=["site"], summary="Events", response_model=models.EventsAnswer)

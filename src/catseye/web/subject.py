@@ -1,5 +1,6 @@
 """Subject of a page: a living site, a journal, or a finished result."""
 
+import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -53,14 +54,15 @@ class PageSubject:
             "commands": self.commands,
             "history": self.watch is not None and self.watch.history,
             "needs_token": needs_token,
-            "now": self._now(),
+            "now": self.now(),
         }
 
-    def _now(self) -> float:
-        import time
-
-        mjd = None if self.watch is None else self.watch.now()
-        return UNIX_EPOCH + time.time() / DAY if mjd is None else mjd
+    def now(self) -> float:
+        """Present MJD, by the site's clock if it is known."""
+        if self.watch is None:
+            return UNIX_EPOCH + time.time() / DAY
+        mjd = self.watch.state()["mjd"] if self.kind == "site" else None
+        return self.watch.now() if mjd is None else float(mjd)
 
 
 def subject_of(settings: "PageSettings") -> PageSubject:
