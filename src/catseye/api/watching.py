@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from catseye.records.site.folder import SiteFolder
-    from catseye.service.watch.watch import SiteWatch
+    from catseye.service.watch.watch import SiteWatch as SiteWatch
 
 Address = tuple[str, int]
 

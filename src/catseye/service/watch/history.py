@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from sqlalchemy import text
+from sqlalchemy import Connection, text
 
 from catseye.coordinator.condition import NO_SHOT
 from catseye.coordinator.journal.entries import EpochSolution
@@ -143,43 +143,43 @@ class History:
     ) -> Iterator[tuple[Object, Callable[[], Any]]]:
         """Epochs of a span, oldest first: summary, and its answer when called; at even distances if there are more."""
         low, high = limits(since, until)
-        seqs: list[tuple[Stretch, int]] = []
-        for stretch in reversed(list(self.index.stretches("solutions", since, until))):
-            with stretch.part.reading() as connection:
-                span = {"run": stretch.run, "low": stretch.low, "high": stretch.high}
-                seqs += [(stretch, int(row[0])) for row in connection.execute(SEQS, span)]
-        step = max(1, -(-len(seqs) // most))
-        for stretch, seq in seqs[::-1][::step][::-1]:
-            with stretch.part.reading() as connection:
-                row = connection.execute(ONE_SOLUTION, {"run": stretch.run, "seq": seq}).first()
+        for connection, run, seq in self._spread(since, until, most):
+            row = connection.execute(ONE_SOLUTION, {"run": run, "seq": seq}).first()
             if row is None or not low <= row.ticks <= high:
                 continue
-            summary = self._summary(stretch.run, seq, row.ticks, row.answer)
+            summary = self._summary(run, seq, row.ticks, row.answer)
             if summary is not None:
                 yield summary, partial(answer_of, row.answer)
 
+    def _spread(self, since: float | None, until: float | None, most: int) -> Iterator[tuple[Connection, int, int]]:
+        """Connection, run and seq of solutions, oldest first; at even distances if there are more than `most`."""
+        seqs: list[tuple[Stretch, list[int]]] = []
+        for stretch in reversed(list(self.index.stretches("solutions", since, until))):
+            with stretch.part.reading() as connection:
+                span = {"run": stretch.run, "low": stretch.low, "high": stretch.high}
+                seqs.append((stretch, [int(row[0]) for row in connection.execute(SEQS, span)]))
+        step = max(1, -(-sum(len(each) for _, each in seqs) // most))
+        for stretch, each in seqs:
+            with stretch.part.reading() as connection:
+                for seq in each[::-1][::step][::-1]:
+                    yield connection, stretch.run, seq
+
     def point_rows(self, name: str, since: float | None, until: float | None, most: int) -> Iterator[PointRow]:
         """MJD, place, u and covariance of a point at each epoch that has it, oldest first, and the epoch's number."""
-        for summary, answer in self.spread_epochs(since, until, most):
-            stored = answer()
+        (low, high) = limits(since, until)
+        for connection, run, seq in self._spread(since, until, most):
+            row = connection.execute(ONE_SOLUTION, {"run": run, "seq": seq}).first()
+            if row is None or not low <= row.ticks <= high:
+                continue
+            stored = answer_of(row.answer)
             names = stored.get("names") or ()
             if name not in names:
                 continue
-            row = names.index(name)
-            triangle = self._triangle(summary["run"], summary["seq"], row)
+            at = names.index(name)
+            triangle = _triangle(connection.execute(PIECE, {"run": run, "seq": seq, "row": 3 * at}).first())
             u = [None if triangle[k] is None else float(np.sqrt(max(triangle[k], 0.0))) for k in (0, 3, 5)]
-            yield summary["mjd"], stored["x"][row], u, triangle, summary["number"]
-
-    def _triangle(self, run: int, seq: int, row: int) -> list[Any]:
-        """Covariance of one point of a solution: six numbers, read without the rest of the matrix."""
-        for part in self.index.parts(run):
-            with part.reading() as connection:
-                piece = connection.execute(PIECE, {"run": run, "seq": seq, "row": 3 * row}).first()
-            if piece is not None and piece.size and piece.part is not None:
-                cells = np.frombuffer(bytes(piece.part), dtype="<f8")
-                if len(cells) == 2 * piece.size + 3:
-                    return [float(cells[i * piece.size + j]) for i in range(3) for j in range(i, 3)]
-        return [None] * 6
+            mjd = (stored.get("ticks") or row.ticks) / TICKS_PER_DAY
+            yield mjd, stored["x"][at], u, triangle, stored["number"]
 
     def solution(
         self, number: int, *, run: int | None = None, at: float | None = None
@@ -343,6 +343,15 @@ class History:
                 if kind == "started" or (mode and holder):
                     break
         return mode, None if holder in (None, "nobody") else str(holder)
+
+
+def _triangle(piece: Any) -> list[Any]:
+    """Covariance of one point from its rows of a matrix: six numbers, None where there is none."""
+    if piece is not None and piece.size and piece.part is not None:
+        cells = np.frombuffer(bytes(piece.part), dtype="<f8")
+        if len(cells) == 2 * piece.size + 3:
+            return [float(cells[i * piece.size + j]) for i in range(3) for j in range(i, 3)]
+    return [None] * 6
 
 
 def _ranger(name: str, shot: Object | None, at: float) -> Object:

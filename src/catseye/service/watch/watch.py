@@ -11,6 +11,7 @@ from catseye.errors import InputError
 from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import SiteFolder
+from catseye.service.watch.commands import LOOK, CommandDesk, Consoles
 from catseye.service.watch.entries import EVENT, SHOT, Object, rows_to_columns
 from catseye.service.watch.history import History, least_severities, require_limit
 from catseye.service.watch.port import SitePort
@@ -68,18 +69,40 @@ class SiteWatch:
                 key=key,
             )
             self.port.keeps_points = journal is None
+        self._desk: CommandDesk | None = None  # made on the loop
+        self._rooms: Consoles | None = None
 
     # Running ---------------------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
         """Watch until cancelled; whatever the site does, it goes on."""
-        if self.port is not None:
-            await self.port.run()
+        if self.port is None:
+            await self._run_journal()
             return
+        tending = asyncio.ensure_future(self._tend())
+        try:
+            await self.port.run()
+        finally:
+            tending.cancel()
+            await asyncio.gather(tending, return_exceptions=True)
+            if self._rooms is not None:
+                self._rooms.close()
+
+    async def _run_journal(self) -> None:
         while True:
             with suppress(InputError):
                 self._tell("state", await asyncio.to_thread(self.state))
             await asyncio.sleep(HISTORY_PERIOD)
+
+    async def _tend(self) -> None:
+        """Give back idle leases, and close idle consoles."""
+        while True:
+            await asyncio.sleep(LOOK)
+            with suppress(InputError, TimeoutError):
+                if self._desk is not None:
+                    await self._desk.give_back()
+            if self._rooms is not None:
+                self._rooms.close_idle()
 
     def _tell(self, kind: str, item: Object) -> None:
         for listener in self.listeners:
@@ -104,6 +127,42 @@ class SiteWatch:
         if self._opened is None:
             self._opened = History(self._place)
         return self._opened
+
+    # Commands --------------------------------------------------------------------------------------------------------
+
+    async def command(self, name: str, parameters: Sequence[str], who: str) -> Object:
+        """Command to the coordinator by a person: its values, when, and from whom the lease was taken.
+
+        Raises InputError with the site's own words if it refuses, or is not connected.
+        """
+        return await self._commands().command(name, parameters, who)
+
+    async def acknowledge(self, alarm: str, who: str) -> Object:
+        """Acknowledge an alarm."""
+        return await self._commands().alarm("ACK", alarm, who)
+
+    async def shelve(self, alarm: str, who: str, minutes: float) -> Object:
+        """Shelve an alarm for some minutes."""
+        return await self._commands().alarm("SHELVE", alarm, f"{minutes:g}", who)
+
+    async def unshelve(self, alarm: str, who: str) -> Object:
+        """End an alarm's shelving."""
+        return await self._commands().alarm("UNSHELVE", alarm, who)
+
+    async def console(self, ranger: str, line: str, who: str) -> Object:
+        """Replies of a ranger to one line of a person."""
+        if self._rooms is None:
+            self._rooms = Consoles(self._consoles, self._network, self._key)
+        return await self._rooms.say(ranger, line, who)
+
+    def _commands(self) -> CommandDesk:
+        """Desk for commands; raises InputError where only a journal is watched."""
+        if self.port is None:
+            raise InputError("a journal takes no commands (expected a living site)")
+        if self._desk is None:
+            port = self.port
+            self._desk = CommandDesk(lambda: port.client, self.clock)
+        return self._desk
 
     # Answers ---------------------------------------------------------------------------------------------------------
 
