@@ -259,7 +259,7 @@ class MadeUpWatch:
         if name == "DROP" and parameters == ["ZY999"]:
             raise InputError("ZY999 is no ranger of the site")
         self.done.append((name, tuple(parameters), who))
-        return {"command": name, "values": list(parameters), "at": MJD}
+        return {"command": name, "values": list(parameters), "at": MJD, "lease_from": None}
 
     async def console(self, ranger, line, who):
         self.done.append((ranger, line, who))

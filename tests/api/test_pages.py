@@ -1,8 +1,11 @@
 """Arguments of pages: subjects, addresses, tokens, browsers."""
 
+import inspect
+
 import pytest
 
 from catseye.api import pages
+from catseye.cli.commands import app, join_commands
 from catseye.errors import ArgumentError, InputError
 
 
@@ -87,3 +90,10 @@ def test_without_its_packages_there_is_no_page(monkeypatch, tmp_path):
     assert "catseye[web]" in line
     with pytest.raises(InputError, match=r"fastapi, not installed here \(expected after pip install"):
         pages.view(tmp_path)
+
+
+def test_view_takes_every_option_of_its_command():
+    join_commands()
+    command = next(each.callback for each in app.registered_commands if each.callback.__name__ == "view")
+    taken = set(inspect.signature(pages.view).parameters)
+    assert set(inspect.signature(command).parameters) - {"quiet"} <= taken

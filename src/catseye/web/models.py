@@ -613,8 +613,9 @@ class CommandAnswer(Shape):
     """Outcome of a command, in the coordinator's words."""
 
     command: str
-    values: Any
-    at: Any
+    values: list[str]
+    at: Number = Field(description="MJD")
+    lease_from: str | None = Field(default=None, description="who had the lease before; null: nobody")
 
 
 class ConsoleBody(Shape):
