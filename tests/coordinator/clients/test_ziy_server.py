@@ -443,8 +443,18 @@ def test_points_have_their_covariance_and_shots():
     samplers.add(EpochSolution(7, answer, matrix))
     one, two = samplers.last("POINTS", 9)
     assert dict(zip(COLUMNS["POINTS"], one[1:], strict=True)) == {
-        **{"epoch": "4", "point": "A", "x_m": "1.0", "y_m": "2.0", "z_m": "3.0", "used": "7"},
-        **{"xx_m2": "0.0", "xy_m2": "7.0", "xz_m2": "14.0", "yy_m2": "14.0", "yz_m2": "21.0", "zz_m2": "28.0"},
+        "epoch": "4",
+        "point": "A",
+        "x_m": "1.0",
+        "y_m": "2.0",
+        "z_m": "3.0",
+        "used": "7",
+        "xx_m2": "0.0",
+        "xy_m2": "7.0",
+        "xz_m2": "14.0",
+        "yy_m2": "14.0",
+        "yz_m2": "21.0",
+        "zz_m2": "28.0",
     }
     assert (two[5], two[6], two[-1]) == ("none", repr(float(matrix[3, 3])), "0")
     samplers.add(EpochSolution(8, {"number": 5, "names": ["A"], "x": [[1.0, 2.0, 3.0]]}))

@@ -67,7 +67,8 @@ class CommandDesk:
                 return
             (client, *_), self._holder = self._holder, None
             if not client.closed.done():
-                await asyncio.wait_for(client.ask("LEASE", "none"), PATIENCE)
+                async with asyncio.timeout(PATIENCE):
+                    await client.ask("LEASE", "none")
 
     async def _take(self, client: ZyClient, who: str) -> str | None:
         """Take the lease, or renew it by its token; the name of the holder before, None if nobody or oneself."""
@@ -84,7 +85,8 @@ class CommandDesk:
 
     async def _answer(self, client: ZyClient, command: str, *parameters: str) -> Reply:
         try:
-            return await asyncio.wait_for(client.ask(command, *parameters), PATIENCE)
+            async with asyncio.timeout(PATIENCE):
+                return await client.ask(command, *parameters)
         except TimeoutError:
             raise InputError(f"no answer to {command} within {PATIENCE:g} s: its outcome is not known") from None
 
@@ -150,22 +152,23 @@ class Consoles:
         if client is not None and not client.closed.done():
             return client
         host, port = self._addresses[ranger]
-        connecting = ZyClient.connect(
-            host,
-            port,
-            first_tid=SECOND_CLIENT_TID,
-            clock=asyncio.get_running_loop().time,
-            network=self._network,
-            key=self._key,
-        )
         try:
-            return await asyncio.wait_for(connecting, CONNECTING)
+            async with asyncio.timeout(CONNECTING):
+                return await ZyClient.connect(
+                    host,
+                    port,
+                    first_tid=SECOND_CLIENT_TID,
+                    clock=asyncio.get_running_loop().time,
+                    network=self._network,
+                    key=self._key,
+                )
         except TimeoutError:
             raise InputError(f"{ranger} does not answer at {host} port {port} within {CONNECTING:g} s") from None
 
     async def _reply(self, client: ZyClient, command: str, *parameters: str) -> Reply:
         try:
-            return await asyncio.wait_for(client.ask(command, *parameters), PATIENCE)
+            async with asyncio.timeout(PATIENCE):
+                return await client.ask(command, *parameters)
         except TimeoutError:
             raise InputError(f"no answer to {command} within {PATIENCE:g} s") from None
 
@@ -174,8 +177,9 @@ class Consoles:
         replies: list[Reply] = []
         tid, first = client.request(request.command, *request.parameters, then=replies.append)
         try:
-            await asyncio.wait_for(first, LONG_COMMAND)
-            await asyncio.wait_for(client.ask("VER"), PATIENCE)
+            async with asyncio.timeout(LONG_COMMAND):
+                await first
+                await client.ask("VER")
         except TimeoutError:
             raise InputError(f"no answer to {request.command} in time: its outcome is not known") from None
         finally:

@@ -78,6 +78,7 @@ class JournalIndex:
         number = self.run(which).run
         if number not in self._sites:
             self._sites[number] = self.reader.site(number)
+            self.reader.close()  # the files themselves are not needed again
         return self._sites[number]
 
     def parts(self, run: int) -> tuple[JournalReader, ...]:

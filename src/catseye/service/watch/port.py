@@ -140,8 +140,8 @@ class SitePort:
     async def _session(self) -> None:
         host, port = self.address
         try:
-            client = await asyncio.wait_for(
-                ZyClient.connect(
+            async with asyncio.timeout(CONNECTING):
+                client = await ZyClient.connect(
                     host,
                     port,
                     heard=self._heard,
@@ -149,9 +149,7 @@ class SitePort:
                     network=self._network,
                     key=self._key,
                     peer="coordinator",
-                ),
-                CONNECTING,
-            )
+                )
         except TimeoutError:
             raise Silent(f"no coordinator answers at {host} port {port} within {CONNECTING:g} s") from None
         self._client = client
@@ -208,7 +206,8 @@ class SitePort:
 
     async def _asked(self, client: ZyClient, command: str, *parameters: object) -> Reply:
         try:
-            return await asyncio.wait_for(client.ask(command, *parameters), PATIENCE)
+            async with asyncio.timeout(PATIENCE):
+                return await client.ask(command, *parameters)
         except TimeoutError:
             raise Silent(f"no answer to {command} within {PATIENCE:g} s") from None
 
@@ -218,7 +217,8 @@ class SitePort:
         replies: list[Reply] = []
         tid, _ = client.request(command, *parameters, then=replies.append)
         try:
-            await asyncio.wait_for(client.ask("VER"), limit)
+            async with asyncio.timeout(limit):
+                await client.ask("VER")
         except TimeoutError:
             raise Silent(f"no answer to {command} within {limit:g} s") from None
         finally:

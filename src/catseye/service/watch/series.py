@@ -200,7 +200,7 @@ def series_names(history: History, site: SiteMap) -> Object:
     pairs: set[tuple[str, str]] = set()
     query = text(
         "SELECT DISTINCT ranger, target FROM (SELECT ranger, target FROM shots WHERE run = :run "
-        "ORDER BY seq DESC LIMIT 20000) AS latest"
+        "AND status = 'used' ORDER BY seq DESC LIMIT 20000) AS latest"
     )
     for part in history.index.parts(run.run)[-1:]:
         with part.reading() as connection:
