@@ -17,7 +17,7 @@ async function unpacked(text: string): Promise<Report> {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   const { shared = [], ...packed } = (await new Response(stream).json()) as Report & { shared?: unknown[] };
   const data = expanded(packed, shared) as Report;
-  if (data.format !== "catseye-report-1") throw new Error(`format ${String(data.format)} is unknown`);
+  if (data.format !== "catseye-report-1") throw `format ${data.format} is unknown`;
   return data;
 }
 
@@ -27,17 +27,16 @@ async function start(): Promise<void> {
   if (!host || !source) return;
   host.textContent = "Loading the data of this report …";
   try {
-    if (!("DecompressionStream" in window)) throw new Error("this browser is too old; one from 2023 or later is needed");
+    if (!("DecompressionStream" in window)) throw "it needs a browser from 2023 or later";
     const data = await unpacked(source.textContent ?? "");
     host.textContent = "";
     report(host, data);
     if (location.hash.length > 1) document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
   } catch (error) {
-    host.textContent = `The data of this report cannot be shown: ${error instanceof Error ? error.message : String(error)}.`;
+    host.textContent = `The data of this report cannot be shown: ${String(error)}.`;
     host.className = "bad";
-    host.setAttribute("role", "alert");
+    host.role = "alert";
   }
 }
 
-if (document.readyState === "loading") addEventListener("DOMContentLoaded", () => void start());
-else void start();
+void start(); // the script stands behind the data

@@ -1,23 +1,29 @@
 // What the parts share: elements, tool tips, colours, printing, ticks.
+import { abs, ceil, floor, known, log10, max, min, round } from "./maths";
 export interface Options { select?: (name: string) => void; label?: string }
 export interface Part<T> { update(data: T): void; select(name: string | null): void; destroy(): void }
 
+type Attributes = Record<string, string | number | boolean>;
 type Child = Node | string | null | undefined | false;
 
 /** Element with attributes and children; a class comes first: el("div.ce-bar", {}, ...). */
 export function el<K extends keyof HTMLElementTagNameMap>(
-  tag: K | `${K}.${string}`, attributes: Record<string, string> = {}, ...children: Child[]
+  tag: K | `${K}.${string}`, attributes: Attributes = {}, ...children: Child[]
 ): HTMLElementTagNameMap[K] {
   const [name, ...classes] = tag.split(".");
   const element = document.createElement(name!) as HTMLElementTagNameMap[K];
   if (classes.length) element.className = classes.join(" ");
-  for (const key in attributes) element.setAttribute(key, attributes[key]!);
+  set(element, attributes);
   for (const child of children) if (child) element.append(child);
   return element;
 }
 
-export function button(text: string, title: string, click: () => void): HTMLButtonElement {
-  const element = el("button", title ? { type: "button", title } : { type: "button" }, text);
+export function set(element: Element, attributes: Attributes): void {
+  for (const key in attributes) element.setAttribute(key, attributes[key] as string);
+}
+
+export function button(text: string, click: () => void): HTMLButtonElement {
+  const element = el("button", { type: "button" }, text);
   element.onclick = click;
   return element;
 }
@@ -28,117 +34,193 @@ export function announce(host: HTMLElement, name: string, select?: (name: string
   select?.(name);
 }
 
-/** Tool tip inside a positioned box; at x, y of the box, turned back where it would leave it. */
-export function tip(box: HTMLElement): { show(x: number, y: number, lines: string[]): void; hide(): void } {
-  const element = el("div.ce-tip", { "aria-hidden": "true" });
-  element.hidden = true;
-  box.append(element);
-  return {
-    show(x, y, lines) {
-      element.replaceChildren(...lines.map((line, i) => el(i ? "span" : "b", {}, line)));
-      element.hidden = false;
-      const { offsetWidth: w, offsetHeight: h } = element;
-      element.style.left = `${Math.max(0, x + 14 + w > box.clientWidth ? x - w - 10 : x + 14)}px`;
-      element.style.top = `${Math.max(0, y + 14 + h > box.clientHeight ? y - h - 8 : y + 14)}px`;
-    },
-    hide() {
-      element.hidden = true;
-    },
-  };
-}
-
 // Colours ------------------------------------------------------------------------------------------------------------
-// The light scheme; used on paper, and where the page defines no variables.
-const LIGHT = {
-  ink: "#1d2a35", faint: "#5d6a75", line: "#d5dde3", soft: "#f4f6f8", paper: "#ffffff", accent: "#1f5a99",
-  good: "#1e7f68", doubtful: "#9a6400", bad: "#b3262f",
-  c0: "#0072b2", c1: "#d55e00", c2: "#008f6b", c3: "#b0578f", c4: "#8a6d00", c5: "#3f97d0", c6: "#5b4fa8", c7: "#6b6b6b",
-  low: "#2166ac", mid: "#d9d9d9", high: "#b2182b",
-};
-export type Palette = Record<keyof typeof LIGHT, string> & { group(i: number): string; diverging(t: number): string };
-
-function finished(colours: Record<keyof typeof LIGHT, string>): Palette {
-  const rgb = [colours.low, colours.mid, colours.high].map(channels);
-  return {
-    ...colours,
-    group: (i) => colours[`c${i % 8}` as "c0"],
-    diverging(t) {
-      const s = Math.min(Math.abs(t), 1) ** 0.8;
-      const end = rgb[t < 0 ? 0 : 2]!;
-      return `rgb(${rgb[1]!.map((mid, i) => Math.round(mid + s * (end[i]! - mid))).join()})`;
-    },
-  };
-}
+const KEYS = ["ink", "faint", "line", "paper", "accent", "doubtful", "bad", "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "low", "mid", "high"] as const;
+type Colours = Record<(typeof KEYS)[number], string>;
+export type Palette = Colours & { group(i: number): string; diverging(t: number): string };
 
 let pixel: CanvasRenderingContext2D | null = null;
 
 /** Red, green, blue, 0 to 255, of any colour that CSS knows. */
 export function channels(colour: string): number[] {
-  pixel ??= Object.assign(document.createElement("canvas"), { width: 1, height: 1 }).getContext("2d", { willReadFrequently: true });
-  if (!pixel) return [128, 128, 128];
+  pixel ??= el("canvas", { width: 1, height: 1 }).getContext("2d", { willReadFrequently: true })!;
   pixel.fillStyle = colour;
   pixel.fillRect(0, 0, 1, 1);
   return [...pixel.getImageData(0, 0, 1, 1).data.slice(0, 3)];
 }
 
-export const PAPER = (): Palette => finished(LIGHT);
-
 /** Colours of the page at a host, as its variables say now. */
 export function palette(host: HTMLElement): Palette {
-  const probe = el("span");
+  const probe = el("i");
   host.append(probe);
-  const colours = { ...LIGHT };
-  for (const key of Object.keys(LIGHT) as (keyof typeof LIGHT)[]) {
-    probe.style.color = `var(--${key},${LIGHT[key]})`;
+  const colours = {} as Colours;
+  for (const key of KEYS) {
+    probe.style.color = `var(--${key},#678)`;
     colours[key] = getComputedStyle(probe).color;
   }
   probe.remove();
-  return finished(colours);
-}
-
-/** Call when the scheme of colours changes; returns what ends it. */
-export function onScheme(call: () => void): () => void {
-  const media = matchMedia("(prefers-color-scheme: dark)");
-  const observer = new MutationObserver(call);
-  media.addEventListener("change", call);
-  observer.observe(document.documentElement, { attributes: true, attributeFilter: ["data-theme"] });
-  return () => {
-    media.removeEventListener("change", call);
-    observer.disconnect();
+  const [low, mid, high] = [colours.low, colours.mid, colours.high].map(channels) as [number[], number[], number[]];
+  return {
+    ...colours,
+    group: (i) => colours[`c${i % 8}` as "c0"],
+    diverging: (t) => `rgb(${mid.map((m, i) => round(m + min(abs(t), 1) ** 0.8 * ((t < 0 ? low : high)[i]! - m))).join()})`,
   };
 }
 
-/** Call before and after printing, once each; returns what ends it. */
-export function onPrint(before: () => void, after: () => void): () => void {
-  const media = matchMedia("print");
-  let printing = false;
-  const start = () => {
-    if (!printing) before();
-    printing = true;
-  };
-  const end = () => {
-    if (printing) after();
-    printing = false;
-  };
-  const change = () => (media.matches ? start() : end());
-  addEventListener("beforeprint", start);
-  addEventListener("afterprint", end);
-  media.addEventListener("change", change);
-  return () => {
-    removeEventListener("beforeprint", start);
-    removeEventListener("afterprint", end);
-    media.removeEventListener("change", change);
-  };
+let light: Palette | null = null;
+
+/** Colours on paper: those of the light scheme, on white. */
+export function paper(host: HTMLElement): Palette {
+  const { dataset } = document.documentElement;
+  const before = dataset.theme;
+  if (!light) {
+    dataset.theme = "light";
+    light = { ...palette(host), paper: "#fff" };
+    if (before === undefined) delete dataset.theme;
+    else dataset.theme = before;
+  }
+  return light;
 }
+
+const printers = new Set<(printing: boolean) => void>();
+let print: MediaQueryList | null = null;
+
+/** Call before and after printing, once each; also what is added while the first is under way. Returns what ends it. */
+export function onPrint(call: (printing: boolean) => void): () => void {
+  let last = false;
+  const turn = (to: boolean) => {
+    // A set goes through what was added meanwhile, too.
+    if (to !== last) for (const printer of printers) printer(to);
+    last = to;
+  };
+  if (!print) {
+    print = matchMedia("print");
+    addEventListener("beforeprint", () => turn(true));
+    addEventListener("afterprint", () => turn(false));
+    print.onchange = (event) => turn(event.matches);
+  }
+  printers.add(call);
+  return () => printers.delete(call);
+}
+
+/** What charts and scenes share: a picture painted when something changed, its tool tip, buttons, spoken text, paper. */
+export interface Surface {
+  canvas: HTMLCanvasElement; // takes pointer and keys
+  stage: HTMLElement;
+  width(): number;
+  bar: HTMLElement;
+  spoken: HTMLElement;
+  colours: Palette;
+  show(x: number, y: number, lines: string[]): void; // tool tip; no lines: none
+  dirty(): void;
+  destroy(): void;
+}
+
+export function surface(host: HTMLElement, kind: "chart" | "scene", label: string, hooks: { paint(width: number, now: number): void; scheme(): void; raster(): HTMLCanvasElement }): Surface {
+  const life = new AbortController();
+  const canvas = el("canvas.ce-live", { tabindex: 0, role: "img" });
+  const tip = el("div.ce-tip", { "aria-hidden": "true" });
+  const stage = el("div.ce-stage", {}, canvas, tip);
+  const sheet = el("img.ce-sheet", { alt: label });
+  const bar = el("div.ce-bar");
+  const spoken = el("p.ce-said", { "aria-live": "polite" });
+  const box = el(`div.ce-${kind}`, {}, stage, bar, spoken, sheet);
+  let frame = 0;
+  let width = 0;
+  const self: Surface = {
+    canvas, stage, bar, spoken,
+    colours: palette(host),
+    show(x, y, lines) {
+      tip.hidden = !lines.length;
+      tip.replaceChildren(...lines.map((line, i) => el(i ? "span" : "b", {}, line)));
+      const { offsetWidth: w, offsetHeight: h } = tip;
+      tip.style.left = `${max(0, x + 14 + w > stage.clientWidth ? x - w - 10 : x + 14)}px`;
+      tip.style.top = `${max(0, y + 14 + h > stage.clientHeight ? y - h - 8 : y + 14)}px`;
+    },
+    width: () => width,
+    dirty() {
+      frame ||= requestAnimationFrame((now) => {
+        frame = 0;
+        width = stage.clientWidth;
+        if (width) hooks.paint(width, now);
+      });
+    },
+    destroy() {
+      cancelAnimationFrame(frame);
+      resize.disconnect();
+      scheme.disconnect();
+      life.abort();
+      stop();
+      box.remove();
+    },
+  };
+  tip.hidden = true;
+  const change = () => {
+    self.colours = palette(host);
+    hooks.scheme();
+    self.dirty();
+  };
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", change, life);
+  let theme = document.documentElement.dataset.theme;
+  const scheme = new MutationObserver(() => {
+    if (theme !== (theme = document.documentElement.dataset.theme)) change();
+  });
+  scheme.observe(document.documentElement, { attributeFilter: ["data-theme"] });
+  const stop = onPrint((printing) => {
+    if (printing) sheet.src = hooks.raster().toDataURL();
+    else sheet.removeAttribute("src");
+    self.dirty();
+  });
+  const resize = new ResizeObserver(() => stage.clientWidth !== width && self.dirty());
+  host.append(box);
+  resize.observe(stage);
+  return self;
+}
+
+export const FONT = "12px system-ui, 'Segoe UI', Roboto, Arial, sans-serif";
+
+/** Size a canvas and clear it; its context in CSS pixels. */
+export function context(canvas: HTMLCanvasElement, width: number, height: number, ratio: number, ground?: string): CanvasRenderingContext2D {
+  canvas.width = round(width * ratio);
+  canvas.height = round(height * ratio);
+  const g = canvas.getContext("2d")!;
+  g.scale(ratio, ratio);
+  if (ground) fill(g, ground, () => g.rect(0, 0, width, height));
+  g.font = FONT;
+  g.textBaseline = "middle";
+  return g;
+}
+
+/** Stroke or fill a path. */
+export function stroke(g: CanvasRenderingContext2D, colour: string, width: number, path: () => void): void {
+  g.strokeStyle = colour;
+  g.lineWidth = width;
+  g.beginPath();
+  path();
+  g.stroke();
+}
+export function segment(g: CanvasRenderingContext2D, x0: number, y0: number, x1: number, y1: number): void {
+  g.moveTo(x0, y0);
+  g.lineTo(x1, y1);
+}
+export function fill(g: CanvasRenderingContext2D, colour: string, path: () => void): void {
+  g.fillStyle = colour;
+  g.beginPath();
+  path();
+  g.fill();
+}
+
+/** Device pixels of a CSS pixel, at most 2. */
+export const pixels = (): number => min(devicePixelRatio || 1, 2);
 
 /** Ticks at 1, 2 or 5 times a power of ten between two values, and the decimals they need. */
 export function ticks(low: number, high: number, most: number): { at: number[]; digits: number; step: number } {
-  const raw = (high - low) / Math.max(most, 1);
-  const power = Math.floor(Math.log10(raw));
+  const raw = (high - low) / max(most, 1);
+  const power = floor(log10(raw));
   const step = [1, 2, 5, 10].map((f) => f * 10 ** power).find((s) => s >= raw * 0.9999) ?? raw;
   const at: number[] = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) at.push(i * step);
-  return { at, digits: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), step };
+  for (let i = ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) at.push(i * step || 0);
+  return { at, digits: max(0, -floor(log10(step) + 1e-9)), step };
 }
 
 const PREFIXED = new Set(["m", "s", "V", "rad", "A", "W"]);
@@ -150,12 +232,12 @@ export function scaled(size: number, unit: string): [number, string] {
 }
 
 /** Quantile of numbers, 0 to 1; nulls do not count; NaN of none. */
-export function quantile(values: (number | null)[], q: number): number {
-  const sorted = Float64Array.from(values.filter((v): v is number => v !== null && Number.isFinite(v))).sort();
-  return sorted[Math.round(q * (sorted.length - 1))] ?? NaN;
+export function quantile(values: unknown[], q: number): number {
+  const sorted = Float64Array.from(values.filter(known)).sort();
+  return sorted[round(q * (sorted.length - 1))] ?? NaN;
 }
 
 /** Size at which a diverging scale ends: nearly all values are inside. */
-export function extent(values: (number | null)[]): number {
-  return quantile(values.map((v) => (v === null ? null : Math.abs(v))), 0.98) || 1;
+export function extent(values: unknown[]): number {
+  return quantile(values.filter(known).map(abs), 0.98) || 1;
 }

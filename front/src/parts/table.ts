@@ -1,17 +1,16 @@
 // Table that sorts, filters and holds only the rows in sight in the document; all rows print.
 import type { Column, Num, Table } from "../lib/types";
-import { announce, button, el, onPrint, type Options, type Part } from "./dom";
+import { announce, button, el, onPrint, quantile, set, type Options, type Part } from "./dom";
 import { csv } from "./download";
 import { decimals, fixed, plain, rounded } from "./number";
+import { abs, ceil, clamp, floor, known, log10, max, min } from "./maths";
 import "./parts.css";
 
 export interface TableOptions extends Options { caption?: string; filter?: boolean; rows?: number }
 
 const HEIGHT = 26; // px of a row where rows are windowed
 const WINDOWED = 120; // rows above which they are
-const PRINTED = 500; // rows built at once while the printer waits
 const order = new Intl.Collator("en", { numeric: true });
-const known = (value: unknown): value is number => typeof value === "number" && Number.isFinite(value);
 
 /** Text of a cell: decimals by its column, or by its own uncertainty. */
 export function cellText(column: Column, row: number, u?: Column): string {
@@ -20,7 +19,23 @@ export function cellText(column: Column, row: number, u?: Column): string {
   if (!known(value)) return "unknown";
   if (column.digits !== undefined) return fixed(value, column.digits);
   const s = u?.values[row];
-  return known(s) && s > 0 ? rounded(value, decimals(s)) : plain(value);
+  return known(s) && s > 0 ? rounded(value, decimals(s)) : value && abs(value) < 1e-9 ? plain(value) : fixed(value, common(column));
+}
+
+const places = new WeakMap<Column, number>();
+
+/** Decimals for all values of a column that states none: four significant digits of nearly the largest, no needless zeros. */
+function common(column: Column): number {
+  let digits = places.get(column);
+  if (digits === undefined) {
+    const values = column.values.filter(known);
+    const size = quantile(values.map(abs), 0.9);
+    const most = size > 0 ? clamp(3 - floor(log10(size)), 0, 10) : 0;
+    digits = 0;
+    while (digits < most && !values.every((v) => abs(v - Number(v.toFixed(digits))) < 1e-12 * abs(v))) digits++;
+    places.set(column, digits);
+  }
+  return digits;
 }
 
 type Test = (row: number) => boolean;
@@ -38,7 +53,7 @@ export function conditions(filter: string, columns: Column[], text: (row: number
     if (!column || !sign || Number.isNaN(value)) return (row) => text(row).includes(word);
     return (row) => {
       const x = column.values[row];
-      return known(x) && COMPARISONS[sign]!(bar ? Math.abs(x) : x, value);
+      return known(x) && COMPARISONS[sign]!(bar ? abs(x) : x, value);
     };
   });
 }
@@ -56,6 +71,7 @@ export function sorted(rows: number[], column: Column, down: boolean): number[] 
 
 export function table(host: HTMLElement, data: Table, options: TableOptions = {}): Part<Table> {
   const caption = options.caption ?? options.label ?? "Table";
+  let { columns } = data;
   let rows: number[] = []; // in sight after filter and sort
   let texts: string[] = [];
   let sort: { key: string; down: boolean } | null = null;
@@ -68,26 +84,28 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   const size = el("span.ce-faint", { role: "status" });
   const spoken = el("span.ce-hidden", { "aria-live": "polite" });
   const body = el("tbody");
-  const head = el("tr", { "aria-rowindex": "1" });
+  const head = el("tr", { "aria-rowindex": 1 });
   const widths = el("colgroup");
   const grid = el("table", {}, el("caption.ce-hidden", {}, caption), widths, el("thead", {}, head), body);
-  const scroll = el("div.ce-scroll", { tabindex: "0", role: "region", "aria-label": `${caption}: arrow keys move, Enter selects` }, grid);
-  const bar = el("div.ce-bar", {}, input, size, button("CSV", "Download these rows", () => csv(caption, data, rows)));
+  const scroll = el("div.ce-scroll", { tabindex: 0, role: "region", "aria-label": `${caption}: arrow keys move, Enter selects` }, grid);
+  const bar = el("div.ce-bar", {}, input, size, button("CSV", () => csv(caption, data, rows)));
   const box = el("div.ce-table", {}, bar, scroll, spoken);
 
-  const named = () => data.columns.find((c) => c.key === data.name) ?? null;
+  const named = () => columns.find((c) => c.key === data.name) ?? null;
   const nameOf = (row: number) => String(named()?.values[row] ?? "");
   const windowed = () => !all && count > WINDOWED;
-  const cell = (c: Column, row: number) => cellText(c, row, c.u ? data.columns.find((d) => d.key === c.u) : undefined);
-  const text = (row: number) => (texts[row] ??= data.columns.map((c) => cell(c, row)).join(" ").toLowerCase());
+  // A column of uncertainties is rounded by itself.
+  const ruler = (c: Column) => columns.find((d) => d.key === c.u) ?? (columns.some((d) => d.u === c.key) ? c : undefined);
+  const cell = (c: Column, row: number) => cellText(c, row, ruler(c));
+  const text = (row: number) => (texts[row] ??= columns.map((c) => cell(c, row)).join(" ").toLowerCase());
 
   function header(): void {
-    head.replaceChildren(...data.columns.map((c) => {
+    head.replaceChildren(...columns.map((c) => {
       const state = sort?.key === c.key ? (sort.down ? "descending" : "ascending") : "none";
-      const press = button(c.label, "Sort", () => {
+      const press = button(c.label, () => {
         sort = state === "none" ? { key: c.key, down: false } : state === "ascending" ? { key: c.key, down: true } : null;
         arrange();
-        [...head.querySelectorAll("button")][data.columns.indexOf(c)]?.focus();
+        [...head.querySelectorAll("button")][columns.indexOf(c)]?.focus();
       });
       if (c.unit) press.append(el("small", {}, ` ${c.unit}`));
       return el(`th.ce-${c.kind}`, { scope: "col", "aria-sort": state }, press);
@@ -97,11 +115,11 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     grid.classList.toggle("ce-fixed", windowed());
     if (!windowed()) return;
     let total = 0;
-    for (const c of data.columns) {
+    for (const c of columns) {
       let longest = c.label.length + (c.unit ? c.unit.length + 1 : 0) + 2;
-      const step = Math.max(1, Math.floor(count / 2000));
-      for (let i = 0; i < count; i += step) longest = Math.max(longest, cell(c, i).length);
-      const width = Math.min(longest, 44) + 2.5;
+      const step = max(1, floor(count / 2000));
+      for (let i = 0; i < count; i += step) longest = max(longest, cell(c, i).length);
+      const width = min(longest, 44) + 2.5;
       total += width;
       const col = el("col");
       col.style.width = `${width}ch`;
@@ -112,14 +130,14 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
 
   function line(at: number): HTMLTableRowElement {
     const row = rows[at]!;
-    const tr = el("tr", { "aria-rowindex": String(at + 2) });
+    const tr = el("tr", { "aria-rowindex": at + 2 });
     tr.dataset.at = String(at);
     if (chosen !== null && named() && nameOf(row) === chosen) {
       tr.className = "ce-chosen";
-      tr.setAttribute("aria-current", "true");
+      set(tr, { "aria-current": true });
     }
     if (at === current) tr.classList.add("ce-current");
-    for (const c of data.columns) {
+    for (const c of columns) {
       const shownText = cell(c, row);
       const td = el(`td.ce-${c.kind}`, {}, shownText);
       const value = c.values[row];
@@ -131,33 +149,33 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   }
 
   const gap = (height: number) => {
-    const td = el("td", { colspan: String(data.columns.length) });
+    const td = el("td", { colspan: columns.length });
     td.style.height = `${height}px`;
-    return el("tr.ce-gap", { "aria-hidden": "true" }, td);
+    return el("tr.ce-gap", { "aria-hidden": true }, td);
   };
 
   function paint(): void {
     if (!windowed()) {
       body.replaceChildren();
-      for (let from = 0; from < rows.length; from += PRINTED) body.append(...rows.slice(from, from + PRINTED).map((_, i) => line(from + i)));
+      rows.forEach((_, at) => body.append(line(at)));
       return;
     }
-    const seen = Math.ceil((scroll.clientHeight || 400) / HEIGHT);
-    const from = Math.min(Math.max(0, Math.floor(scroll.scrollTop / HEIGHT) - 6), Math.max(0, rows.length - seen));
-    const to = Math.min(rows.length, from + seen + 12);
+    const seen = ceil(max(scroll.clientHeight, 480) / HEIGHT);
+    const from = clamp(0, floor(scroll.scrollTop / HEIGHT) - 6, max(0, rows.length - seen));
+    const to = min(rows.length, from + seen + 12);
     const lines = [];
     for (let i = from; i < to; i++) lines.push(line(i));
     body.replaceChildren(gap(from * HEIGHT), ...lines, gap((rows.length - to) * HEIGHT));
   }
 
   function arrange(): void {
-    const tests = conditions(input.value, data.columns, text);
-    const column = data.columns.find((c) => c.key === sort?.key);
+    const tests = conditions(input.value, columns, text);
+    const column = columns.find((c) => c.key === sort?.key);
     const passed = Array.from({ length: count }, (_, i) => i).filter((row) => tests.every((test) => test(row)));
     const before = rows[current];
     rows = column && sort ? sorted(passed, column, sort.down) : passed;
     current = before === undefined ? -1 : rows.indexOf(before);
-    grid.setAttribute("aria-rowcount", String(rows.length + 1));
+    set(grid, { "aria-rowcount": rows.length + 1 });
     size.textContent = rows.length === count ? `${count} rows` : `${rows.length} of ${count} rows`;
     header();
     paint();
@@ -204,34 +222,36 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   };
   scroll.onkeydown = (event) => {
     if (event.target !== scroll) return;
-    const page = Math.max(1, Math.floor(scroll.clientHeight / HEIGHT) - 2);
+    const page = max(1, floor(scroll.clientHeight / HEIGHT) - 2);
     const moves: Record<string, number> = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity };
     const move = moves[event.key];
     if (event.key === "Enter" && current >= 0) choose(current);
     else if (move !== undefined && rows.length) {
-      current = Math.min(Math.max(current + move, 0), rows.length - 1);
+      current = clamp(current + move, 0, rows.length - 1);
       reveal(current);
       const row = rows[current]!;
-      spoken.textContent = data.columns.slice(0, 6).map((c) => `${c.label} ${cell(c, row)} ${c.unit}`).join(", ");
+      spoken.textContent = columns.slice(0, 6).map((c) => `${c.label} ${cell(c, row)} ${c.unit}`).join(", ");
     } else return;
     event.preventDefault();
   };
-  const print = (whole: boolean) => {
-    all = whole;
+  const stop = onPrint((printing) => {
+    all = printing;
     header();
     paint();
-  };
-  const stop = onPrint(() => print(true), () => print(false));
+  });
 
   function update(next: Table): void {
     data = next;
+    columns = data.columns;
     texts = [];
-    count = data.columns[0]?.values.length ?? 0;
+    count = columns[0]?.values.length ?? 0;
     grid.classList.toggle("ce-named", named() !== null);
     bar.hidden = options.filter === false;
     input.hidden = count < 6;
     arrange();
   }
+  const resize = new ResizeObserver(() => windowed() && paint());
+  resize.observe(scroll);
   if (options.rows) scroll.style.maxHeight = `${(options.rows + 1) * HEIGHT + 10}px`;
   host.append(box);
   update(data);
@@ -248,6 +268,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
     },
     destroy() {
       stop();
+      resize.disconnect();
       clearTimeout(typing);
       box.remove();
     },

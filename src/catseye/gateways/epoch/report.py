@@ -154,8 +154,14 @@ def _pose(reduction: Reduction) -> list[Block]:
     assert surface is not None
     pose, u = surface.pose(), np.sqrt(np.diag(surface.fit.covariance))
     motion = [
-        *((f"shift along {a} (mm)", pose["translation"][k] / MILLIMETRE, u[k] / MILLIMETRE) for k, a in enumerate("xyz")),
-        *((f"rotation about {a} (″)", pose["rotation"][k] / ARCSECOND, u[3 + k] / ARCSECOND) for k, a in enumerate("xyz")),
+        *(
+            (f"shift along {a} (mm)", pose["translation"][k] / MILLIMETRE, u[k] / MILLIMETRE)
+            for k, a in enumerate("xyz")
+        ),
+        *(
+            (f"rotation about {a} (″)", pose["rotation"][k] / ARCSECOND, u[3 + k] / ARCSECOND)
+            for k, a in enumerate("xyz")
+        ),
     ]
     places = [
         ("pivot of the rotation: nominal vertex", *pose["pivot"]),
@@ -191,8 +197,8 @@ def _prisms(prisms: PrismRows) -> Table:
 
 def _network(reduction: Reduction) -> Section:
     caption = (
-        "All points with their 95 % ellipsoids; lines are used ranges, coloured by the standardised residual w. A point "
-        "that the ranges do not determine in some direction has a large ellipsoid, which is capped and marked."
+        "All points with their 95 % ellipsoids; lines are used ranges, coloured by the standardised residual w. A "
+        "point that the ranges do not determine in some direction has a large ellipsoid, which is capped and marked."
     )
     return Section("network", "Network", [SceneBlock("network", network_scene(reduction), caption)])
 
@@ -294,18 +300,11 @@ def _air(reduction: Reduction) -> Section:
         uncertainty("u", "u", digits=4),
         text("unit", "unit"),
     )
-    refractivity = refractivity_chart(reduction)
     return Section(
         "air",
         "Air",
         [
-            refractivity
-            and ChartBlock(
-                "refractivity",
-                refractivity,
-                "Group refractivity (n − 1) along every used path, coloured by its mean height above their middle. "
-                f"Dashed: the mean, {reduction.coordinates.refractivity_ppm:.2f} ppm.",
-            ),
+            _refractivity(reduction),
             *(
                 ChartBlock(key, chart, "Readings of the weather stations.")
                 for key, chart in weather_charts(reduction).items()
@@ -314,6 +313,15 @@ def _air(reduction: Reduction) -> Section:
             *_benchmarks(reduction),
         ],
     )
+
+
+def _refractivity(reduction: Reduction) -> ChartBlock | None:
+    chart = refractivity_chart(reduction)
+    caption = (
+        "Group refractivity (n − 1) along every used path, coloured by its mean height above their middle. "
+        f"Dashed: the mean, {reduction.coordinates.refractivity_ppm:.2f} ppm."
+    )
+    return None if chart is None else ChartBlock("refractivity", chart, caption)
 
 
 def _benchmarks(reduction: Reduction) -> list[Block]:
@@ -392,14 +400,14 @@ def _shots(reduction: Reduction) -> Section:
         "shot",
     )
     lead = "Shots with a phase, by ranger. Every correction to each range is in ranges.csv."
-    title = f"{len(ranges.shot)} ranges"
-    return Section("shots", "Ranges", [Text(lead), TableBlock("shots", table, folded=title)])
+    return Section("shots", "Ranges", [Text(lead), TableBlock("shots", table, folded="Ranges")])
 
 
 def _provenance(reduction: Reduction, when: datetime) -> Section:
     campaign = reduction.campaign
     settings = {
-        key: f"{value:.6g}" if isinstance(value, float) else str(value) for key, value in vars(reduction.settings).items()
+        key: f"{value:.6g}" if isinstance(value, float) else str(value)
+        for key, value in vars(reduction.settings).items()
     }
     lead = f"Adjustment: {reduction.coordinates.status}. The same, for programs, is in provenance.json."
     return origin_section(

@@ -10,7 +10,8 @@ from catseye.reduction.epoch.surface import DishFit
 
 BEYOND = 1.35  # times the largest residual of a used shot: limit of the rejected shots in a chart
 RIM = 73  # points of the aperture's outline
-AFTER = "minutes after the first shot"
+GROUPS = ("ground rangers", "feed-arm rangers", "rejected")  # of residuals
+AFTER = "time after the first shot"
 
 
 def network_scene(reduction: Reduction) -> Scene:
@@ -30,7 +31,8 @@ def network_scene(reduction: Reduction) -> Scene:
         group=[groups.index(kinds[row]) for row in rows],
         covariance=coordinates.joint.blocks[rows],
         info=[
-            f"{kinds[row]}, {coordinates.shots[row]:.0f} shots, u {' / '.join(f'{v:.3f}' for v in u[row])} mm" for row in rows
+            f"{kinds[row]}, {coordinates.shots[row]:.0f} shots, u {' / '.join(f'{v:.3f}' for v in u[row])} mm"
+            for row in rows
         ],
         beams=Beams(
             start=[index[ranges.ranger[k]] for k in used],
@@ -94,9 +96,12 @@ def residual_charts(reduction: Reduction) -> dict[str, tuple[Chart, str]]:
         "w-by-elevation": (by(elevation), "The same by the path's elevation at the ranger."),
         "w-histogram": (
             Chart("histogram", standardised, limits=limits),
-            "Histogram of w, and the normal distribution that the claimed uncertainties predict.",
+            "Histogram of w: a normal distribution of width 1 where the claimed uncertainties hold.",
         ),
-        "w-normal": (Chart("normal", standardised, names=names), "w against the quantiles of the normal distribution."),
+        "w-normal": (
+            Chart("normal", standardised, names=names),
+            "w against the quantiles of that normal distribution.",
+        ),
     }
 
 
@@ -117,7 +122,7 @@ def _in_time(reduction: Reduction) -> tuple[Chart, str]:
         Axis("observed minus adjusted", "mm", residual[rows], digits=4),
         names=shots.shot[ranges.shot[rows]].tolist(),
         group=group,
-        groups=("ground rangers", "feed-arm rangers", "rejected"),
+        groups=GROUPS[: int(group.max()) + 1],
     )
     return chart, f"Residuals of the ranges in the order of time.{more}"
 
@@ -138,7 +143,9 @@ def zeros_chart(reduction: Reduction) -> Chart:
     zeros = reduction.coordinates.zeros
     names = sorted(zeros)
     value, u = (np.array([zeros[name][part] for name in names]) * 1e6 for part in (0, 1))
-    return Chart("scatter", categories("ranger", names), Axis("correction to the range", "µm", value, digits=2), u=u, names=names)
+    return Chart(
+        "scatter", categories("ranger", names), Axis("correction to the range", "µm", value, digits=2), u=u, names=names
+    )
 
 
 def refractivity_chart(reduction: Reduction) -> Chart | None:
@@ -165,7 +172,7 @@ def weather_charts(reduction: Reduction) -> dict[str, Chart]:
     """Temperature, pressure and humidity of the stations over time."""
     weather, site = reduction.campaign.weather, reduction.campaign.site
     order = {device.name: k for k, device in enumerate(site.weather_station)}
-    rows = np.lexsort((weather.mjd_utc, [order[name] for name in weather.station]))
+    rows = np.lexsort((weather.mjd_utc, np.array([order[name] for name in weather.station])))
     minutes = Axis(AFTER, "min", _minutes(reduction, weather.mjd_utc[rows]), digits=2)
     columns = (
         ("temperature", "°C", weather.temperature_c),

@@ -124,7 +124,7 @@ def _observations(adjusted: AdjustedNetwork, file: str) -> Section:
         "uncertainty; the estimated error explains it best if nothing else is wrong."
     )
     table = observation_table(adjusted, rows)
-    blocks = [*residual_charts(adjusted), Text(lead), TableBlock("observations", table)]
+    blocks: list[Block] = [*residual_charts(adjusted), Text(lead), TableBlock("observations", table)]
     return Section("observations", "Observations", blocks)
 
 

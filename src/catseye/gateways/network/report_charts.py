@@ -1,7 +1,5 @@
 """Scenes and charts of the reports on networks, their plans and their comparison."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
@@ -38,11 +36,13 @@ def network_view(adjusted: AdjustedNetwork, *, predicted: bool = False) -> Scene
     flat = "" if np.array_equal(adjusted.network.axes, np.eye(3)) else " The tables have the axes of the file."
     beams, count = _beams(adjusted, rows, predicted=predicted)
     most = f" The {len(beams.start)} worst of {count} observed pairs." if len(beams.start) < count else ""
+    groups, group = _roles(adjusted, rows)
     scene = Scene(
         frame=FRAME,
         names=[adjusted.names[i] for i in rows],
         x=_places(adjusted)[rows],
-        **_roles(adjusted, rows),
+        groups=groups,
+        group=group,
         covariance=_covariance(adjusted)[rows] if adjusted.answered else None,
         info=_lines(adjusted, rows),
         beams=beams,
@@ -65,13 +65,13 @@ def _covariance(adjusted: AdjustedNetwork) -> np.ndarray:
     return np.nan_to_num(adjusted.solution.covariance) * adjusted.factor
 
 
-def _roles(adjusted: AdjustedNetwork, rows: np.ndarray) -> dict[str, Sequence]:
-    """Groups of the points: station or target, held or not."""
-    held = ~adjusted.network.points.free.any(axis=1)
+def _roles(adjusted: AdjustedNetwork, rows: np.ndarray) -> tuple[list[str], np.ndarray]:
+    """Groups of the points, station or target, held or not, and each point's group."""
+    held = np.asarray(~adjusted.network.points.free.any(axis=1))
     names = ("target", "station", "held point", "held station")
     kind = adjusted.stations[rows].astype(int) + 2 * held[rows]
     used = np.unique(kind)
-    return {"groups": [names[k] for k in used], "group": np.searchsorted(used, kind)}
+    return [names[k] for k in used], np.searchsorted(used, kind)
 
 
 def _lines(adjusted: AdjustedNetwork, rows: np.ndarray) -> list[str]:
@@ -92,7 +92,8 @@ def _beams(adjusted: AdjustedNetwork, rows: np.ndarray, *, predicted: bool) -> t
     place[rows] = np.arange(len(rows))
     order = table.worst_first
     ends = place[table.ends[order, :2]]
-    drawn = order[table.active[order] & (ends >= 0).all(axis=1)]
+    joined = np.asarray(ends.min(axis=1, initial=0) >= 0)
+    drawn = order[table.active[order] & joined]
     shown = drawn[:MOST_BEAMS]
     ends = place[table.ends[shown, :2]]
     value = np.full(len(shown), np.nan) if predicted else adjusted.statistic[shown]
@@ -107,7 +108,9 @@ def residual_charts(adjusted: AdjustedNetwork) -> list[ChartBlock]:
         return []
     if len(tested) > MOST_BEAMS:
         tested = np.sort(tested[np.argsort(-np.abs(adjusted.statistic[tested]), kind="stable")[:MOST_BEAMS]])
-    statistic = Axis(f"test statistic {'τ' if adjusted.test == 'tau' else 'w'}", "", adjusted.statistic[tested], digits=3)
+    statistic = Axis(
+        f"test statistic {'τ' if adjusted.test == 'tau' else 'w'}", "", adjusted.statistic[tested], digits=3
+    )
     names = [adjusted.label(int(k)) for k in tested]
     limits = (-adjusted.critical, adjusted.critical) if np.isfinite(adjusted.critical) else ()
     kinds = [kind.replace("_", " ") for kind in table.kinds]
@@ -141,9 +144,11 @@ def residual_charts(adjusted: AdjustedNetwork) -> list[ChartBlock]:
         ChartBlock(
             "w-histogram",
             Chart("histogram", statistic, limits=limits),
-            "Their histogram, and the normal distribution that the claimed uncertainties predict.",
+            "Their histogram: a normal distribution of width 1 where the claimed uncertainties hold.",
         ),
-        ChartBlock("w-normal", Chart("normal", statistic, names=names), "Against the normal distribution."),
+        ChartBlock(
+            "w-normal", Chart("normal", statistic, names=names), "Against the quantiles of that normal distribution."
+        ),
     ]
 
 
@@ -204,10 +209,11 @@ def displacement_view(compared: ComparedEpochs, lengthening: float) -> SceneBloc
         info=_displacement_lines(compared, rows),
         lines=arrows,
     )
+    times = f"{lengthening:,.0f}".replace(",", "\u2009")
     caption = (
-        f"Points by verdict. Lines: displacements, drawn {lengthening:,.0f} times as long; ellipsoids: 95 % of the "
-        "displacements, about no displacement. A point is judged by all of its coordinates together."
-    ).replace(",", "\u2009", 1 if lengthening >= 1000.0 else 0)
+        f"Points by verdict. Lines: displacements, drawn {times} times as long; ellipsoids: 95 % of the displacements, "
+        "about no displacement. A point is judged by all of its coordinates together."
+    )
     return SceneBlock("displacements", scene, caption)
 
 

@@ -82,9 +82,7 @@ def number(
 
 def uncertainty(key: str, label: str, values: Values = (), unit: str = "", digits: int | None = None) -> Column:
     """Column of standard uncertainties, kept to four significant digits; arguments as for `Column`."""
-    return Column(
-        key=key, label=label, values=values, unit=unit, kind="number", digits=digits, significant=SIGNIFICANT
-    )
+    return Column(key=key, label=label, values=values, unit=unit, kind="number", digits=digits, significant=SIGNIFICANT)
 
 
 def text(key: str, label: str, values: Values = (), kind: ColumnKind = "text") -> Column:
@@ -124,10 +122,17 @@ class Table:
         }
 
 
-def pairs(rows: Mapping[str, str] | Iterable[tuple[str, str]], first: str, second: str, *, hashes: bool = False) -> Table:
+def pairs(
+    rows: Mapping[str, str] | Iterable[tuple[str, str]], first: str, second: str, *, hashes: bool = False
+) -> Table:
     """Table of names with a text or a digest each."""
     listed = list(rows.items()) if isinstance(rows, Mapping) else list(rows)
     return Table.of_rows(listed, text("name", first), text("value", second, kind="hash" if hashes else "text"))
+
+
+def sentences(passages: Iterable[tuple[str, str]], first: str = "on") -> Table:
+    """Table of passages, for those of a part of the report."""
+    return Table.of_rows(passages, text("title", first), text("text", "result", kind="long"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -398,12 +403,8 @@ def origin_section(
     blocks   that go first
     """
     rows = {"made (UTC)": f"{when:%Y-%m-%d %H:%M:%S}", **versions(), **(facts or {})}
-    files = TableBlock("inputs", pairs(inputs, "file read", "SHA-256", hashes=True), folded=_counted(len(inputs)))
+    files = TableBlock("inputs", pairs(inputs, "file read", "SHA-256", hashes=True), folded="Inputs and their SHA-256")
     return Section("provenance", "Provenance", [*blocks, TableBlock("versions", pairs(rows, "item", "value")), files])
-
-
-def _counted(files: int) -> str:
-    return f"Inputs: SHA-256 of {files} file{'' if files == 1 else 's'}"
 
 
 def report_object(report: Report) -> dict[str, Any]:

@@ -19,10 +19,12 @@ from catseye.version import __version__
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 ROUNDED = (
     "Numbers of this page are rounded to their useful digits: coordinates to 0.1 µm, standard uncertainties to four "
-    "digits. The CSV and JSON files beside it have all digits."
+    "digits. The command's CSV and JSON files have all digits."
 )
 SHORT = 50  # values of a column; shorter ones are repeated
-WITHOUT = "The tables, charts and drawings of this report need a browser with scripts; they load nothing from elsewhere."
+WITHOUT = (
+    "The tables, charts and drawings of this report need a browser with scripts; they load nothing from elsewhere."
+)
 
 
 def report_page(report: Report) -> str:

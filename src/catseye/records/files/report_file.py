@@ -34,22 +34,31 @@ def read_report(path: Path) -> dict[str, Any]:
     Raises InputError for a missing or foreign file, one of an older catseye, one that is damaged or too large.
     """
     page = path / PAGE if path.is_dir() else path
-    text = _text(page, path)
+    return report_in(_text(page, path), str(page))
+
+
+def report_in(text: str, page: str) -> dict[str, Any]:
+    """Report in the text of a page; InputError as for `read_report`.
+
+    page   name for messages
+    """
     start = text.find(DATA)
     if start < 0:
-        raise refusal(str(page), _foreign(text))
+        raise refusal(page, _foreign(text))
     packed = text[start + len(DATA) : max(text.find("</script>", start), start)]
-    report = _document(_unpacked(packed, str(page)), str(page))
+    report = _document(_unpacked(packed, page), page)
     if not isinstance(report, dict) or report.get("format") != FORMAT:
         found = report.get("format") if isinstance(report, dict) else report
-        raise refusal(str(page), f"format = {shown(found)} (expected {FORMAT}: use the catseye that wrote it, or run it again)")
+        raise refusal(
+            page, f"format = {shown(found)} (expected {FORMAT}: use the catseye that wrote it, or run it again)"
+        )
     try:
         report = _expanded(report)
         _require_report(report)
     except RecursionError as problem:
-        raise refusal(str(page), "the report's data are nested too deeply (run it again)") from problem
+        raise refusal(page, "the report's data are nested too deeply (run it again)") from problem
     except _Misshapen as problem:
-        raise refusal(str(page), f"the report's data: {problem} (run it again)") from problem
+        raise refusal(page, f"the report's data: {problem} (run it again)") from problem
     return report
 
 
@@ -124,7 +133,9 @@ def _expanded(report: Mapping[str, Any]) -> dict[str, Any]:
             return list(lists[place])
         if isinstance(part, dict):
             return {key: expanded(item) for key, item in part.items()}
-        return [expanded(item) for item in part] if isinstance(part, list) and part and isinstance(part[0], dict) else part
+        return (
+            [expanded(item) for item in part] if isinstance(part, list) and part and isinstance(part[0], dict) else part
+        )
 
     return {key: expanded(item) for key, item in report.items() if key != SHARED}
 
