@@ -20,7 +20,6 @@ from load_scene import LoadChild, load_site
 from repository import ROOT
 
 TICK = 864e-6  # s
-TARGETS = 2340
 LONGEST_START, SETTLED = 90.0, 14.0  # s: the round that was planned before the streams comes to its end
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
@@ -65,8 +64,11 @@ class BusySite:
 
 
 @asynccontextmanager
-async def busy_site(*, rangers=18, targets=TARGETS, keep_buffers=True):
-    """A coordinator of rangers that stream, with a journal in a temporary folder."""
+async def busy_site(*, rangers=18, targets=None, keep_buffers=True):
+    """A coordinator of rangers that stream, with a journal in a temporary folder.
+
+    targets   as `load_site`; None for Green Bank's own
+    """
     with tempfile.TemporaryDirectory() as name, LoadChild(rangers, targets) as child:
         folder = Path(name)
         site = load_site(rangers, targets)

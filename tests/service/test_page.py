@@ -52,7 +52,7 @@ def test_settings_that_are_refused(change, words):
 
 @pytest.mark.parametrize("line", ["", "[]", "{", "[" * 10_000])
 def test_a_line_without_settings(line):
-    with pytest.raises(InputError, match="page: settings"):
+    with pytest.raises(InputError, match="settings"):
         read_settings(line)
 
 

@@ -67,13 +67,21 @@ def view(
         commanding=False,
     )
 
+    listened: list[PageAddress] = []
+
     def listening(at: "PageAddress") -> None:
+        listened.append(at)
         announce(at.link())
         if browser and at.token is None and has_browser():
             open_browser(at.url())
 
     async def work() -> None:
-        page = PageChild(address, lambda at: at.settings(**subject), listening=listening, warned=warn)
+        page = PageChild(
+            address,
+            lambda at: at.settings(**subject),
+            listening=listening,
+            warned=lambda line: warn(line) if listened else None,  # why it does not start is raised
+        )
         await page.child.keep()
 
     run: LiveRun[None] = LiveRun(work)

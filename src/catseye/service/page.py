@@ -77,7 +77,7 @@ def read_settings(line: str) -> PageSettings:
     except ValidationError as problem:
         first = problem.errors(include_url=False, include_input=False)[0]
         where = ".".join(map(str, first["loc"])) or "settings"
-        raise InputError(f"page: {where}: {first['msg']}") from None
+        raise InputError(f"{where}: {first['msg']}") from None
 
 
 @dataclass(frozen=True)
@@ -128,11 +128,11 @@ class PageAddress:
 
 
 def refuse_files(address: PageAddress) -> None:
-    """Raise InputError for a certificate or a key that cannot be used."""
+    """Raise InputError for a certificate or a key that cannot be used; a key with a password is one."""
     if address.certificate is None:
         return
     try:
-        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(address.certificate, address.key)
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(address.certificate, address.key, password="")
     except (OSError, ValueError) as problem:
         raise InputError(f"{address.certificate}: certificate or key cannot be used: {problem}") from problem
 

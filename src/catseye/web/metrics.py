@@ -125,10 +125,12 @@ class _SiteCollector(Collector):
         failures = CounterMetricFamily("catseye_ranger_failures", "Failed shots of a ranger", labels=["ranger"])
         ages = GaugeMetricFamily("catseye_ranger_shot_age_seconds", "Age of a ranger's last shot", labels=["ranger"])
         for row in state["rangers"]:
-            values = (row["shots"], row["failures"], age(now, row["mjd"]))
-            for add, value in zip((shots.add_metric, failures.add_metric, ages.add_metric), values, strict=True):
-                if value is not None:
-                    add([row["name"]], value)
+            if row["shots"] is not None:
+                shots.add_metric([row["name"]], row["shots"])
+            if row["failures"] is not None:
+                failures.add_metric([row["name"]], row["failures"])
+            if row["mjd"] is not None:
+                ages.add_metric([row["name"]], (now - row["mjd"]) * DAY)
         yield from (shots, failures, ages)
 
 

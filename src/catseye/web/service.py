@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from catseye.api.pages import PageSettings
 
 SEND_BUFFER = 262_144  # bytes of a connection in the kernel: a client that takes nothing is seen after so many
-LONGEST_SETTINGS = 2**20  # bytes
+LONGEST_SETTINGS = 65_536  # bytes
 
 
 def run(settings: "PageSettings") -> None:
@@ -40,9 +40,8 @@ def run(settings: "PageSettings") -> None:
 
 
 async def _run(settings: "PageSettings", subject: PageSubject, listener: socket.socket) -> None:
-    refusals, ending = RefusalLog(), asyncio.Event()
-    logging.basicConfig(handlers=[OneLineHandler(refusals)], level=logging.WARNING, force=True)
-    loop = asyncio.get_running_loop()
+    refusals, ending, loop = RefusalLog(), asyncio.Event(), asyncio.get_running_loop()
+    logging.basicConfig(handlers=[OneLineHandler(refusals, loop)], level=logging.WARNING, force=True)
     end_with_stdin(lambda: loop.call_soon_threadsafe(ending.set))
 
     def listening() -> None:
@@ -141,26 +140,27 @@ def listening_socket(host: str, port: int) -> socket.socket:
             listener.close()
             raise
     except OSError as problem:
-        raise InputError(f"page: cannot listen at {host} port {port}: {problem.strerror or problem}") from problem
+        raise InputError(f"cannot listen at {host} port {port}: {problem.strerror or problem}") from problem
     return listener
 
 
 class OneLineHandler(logging.Handler):
-    """Python's logging as single lines at a bounded rate.
+    """Python's logging as single lines at a bounded rate, from any thread.
 
     refusals   log that bounds the rate
+    loop       of that log
     """
 
-    def __init__(self, refusals: RefusalLog):
+    def __init__(self, refusals: RefusalLog, loop: asyncio.AbstractEventLoop):
         super().__init__()
-        self._refusals = refusals
+        self._refusals, self._loop = refusals, loop
 
     def emit(self, record: logging.LogRecord) -> None:
         text = record.getMessage()
         if record.exc_info and record.exc_info[1] is not None:
             text = f"{text}: {type(record.exc_info[1]).__name__}: {record.exc_info[1]}"
-        with suppress(RuntimeError):  # no loop is running any more
-            self._refusals.say(text)
+        with suppress(RuntimeError):  # the loop is closed
+            self._loop.call_soon_threadsafe(self._refusals.say, text)
 
 
 def first_line() -> str:
@@ -173,7 +173,7 @@ def first_line() -> str:
         part = os.read(sys.stdin.fileno(), 1)
         line += part
         if not part or len(line) > LONGEST_SETTINGS:
-            raise InputError("page: no settings on standard input (expected a line of JSON)")
+            raise InputError("no settings on standard input (expected a line of JSON)")
     return line.decode("utf-8", "replace")
 
 
