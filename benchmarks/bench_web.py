@@ -23,7 +23,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from page_scene import busy_site, cpu_of, listening_to, memory_of, page_of
+from web.busy_scene import busy_site, cpu_of, listening_to, memory_of, page_of
 
 SETTLED = 3.0  # s after clients came
 ASSET = re.compile(r'(?:src|href)="(/[^"]+)"')

@@ -5,7 +5,7 @@ import json
 import pytest
 from hypothesis import HealthCheck, settings
 
-from web_scene import DOCUMENT, TOKEN, served_page
+from web.page_scene import DOCUMENT, TOKEN, served_page
 
 schemathesis = pytest.importorskip("schemathesis", reason="the extra test-web is not installed")
 

@@ -5,11 +5,11 @@ import json
 
 import pytest
 
-import web_scene  # isort: skip - skips where the extra is absent
+from web import page_scene  # isort: skip - skips where the extra is absent
 from catseye.web import feed as feed_module
 from catseye.web.feed import KINDS, MOST_BATCHES, LiveClient, LiveFeed, encoded
 
-assert web_scene.TOKEN
+assert page_scene.TOKEN
 
 
 def batch(*kinds):

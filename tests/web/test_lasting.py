@@ -5,10 +5,10 @@ import statistics
 
 import pytest
 
-import web_scene  # isort: skip - skips where the extra is absent
-from page_scene import busy_site, listening_to, memory_of, page_of
+from web import page_scene  # isort: skip - skips where the extra is absent
+from web.busy_scene import busy_site, listening_to, memory_of, page_of
 
-assert web_scene.TOKEN
+assert page_scene.TOKEN
 LOOK = 5.0  # s
 
 

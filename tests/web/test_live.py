@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from web_scene import MJD, TOKEN, sent_raw, served_page
+from web.page_scene import MJD, TOKEN, sent_raw, served_page
 
 from catseye.web import live, protocols  # isort: skip - after the skip of the scene
 from websockets.exceptions import ConnectionClosed  # isort: skip

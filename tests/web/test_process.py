@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-import web_scene  # isort: skip - skips where the extra is absent
+from web import page_scene  # isort: skip - skips where the extra is absent
 import httpx  # isort: skip
 from catseye.service.page import PROGRAM
 from catseye.web import models
@@ -62,29 +62,29 @@ def test_a_journal_in_a_browser(tmp_path):
         assert token is None
         page = page_of(process)
         assert got(base, "service")["kind"] == "journal"
-        epochs = models.EpochsAnswer.model_validate(got(base, "epochs")).epochs
+        epochs = models.EpochsJson.model_validate(got(base, "epochs")).epochs
         number = epochs[-1].number
-        shots = models.ShotsAnswer.model_validate(got(base, "shots?limit=50"))
+        shots = models.ShotsJson.model_validate(got(base, "shots?limit=50"))
         shot = next(n for n, status in zip(shots.number, shots.status, strict=True) if status == "used")
         names = [each["name"] for each in got(base, "series/names")["names"]]
         point = got(base, f"epochs/{number}")["points"]["name"][0]
         paths = {
-            "site": "SiteAnswer",
-            "state": "StateAnswer",
-            "dropped": "DroppedAnswer",
-            "events": "EventsAnswer",
-            f"state?at={epochs[0].mjd}": "StateAnswer",
-            f"epochs/{number}": "EpochAnswer",
-            f"epochs/{number}/residuals": "ResidualsAnswer",
-            "series/names": "SeriesNamesAnswer",
-            f"series?names={','.join(names[:3])}": "SeriesAnswer",
-            f"shots/{shot}": "ShotAnswer",
-            f"shots/{shot}/samples": "SamplesAnswer",
-            f"points/{point}": "PointAnswer",
-            f"rangers/{shots.ranger[0]}": "RangerAnswer",
-            "calibrations": "CalibrationsAnswer",
-            "air": "AirAnswer",
-            f"comparison?first={epochs[0].number}&second={number}": "ComparisonAnswer",
+            "site": "SiteJson",
+            "state": "StateJson",
+            "dropped": "DroppedJson",
+            "events": "EventsJson",
+            f"state?at={epochs[0].mjd}": "StateJson",
+            f"epochs/{number}": "EpochJson",
+            f"epochs/{number}/residuals": "ResidualsJson",
+            "series/names": "SeriesNamesJson",
+            f"series?names={','.join(names[:3])}": "SeriesJson",
+            f"shots/{shot}": "ShotJson",
+            f"shots/{shot}/samples": "SamplesJson",
+            f"points/{point}": "PointJson",
+            f"rangers/{shots.ranger[0]}": "RangerJson",
+            "calibrations": "CalibrationsJson",
+            "air": "AirJson",
+            f"comparison?first={epochs[0].number}&second={number}": "ComparisonJson",
         }
         for path, shape in paths.items():
             answer = httpx.get(f"{base}api/{path}", timeout=60.0)
@@ -128,7 +128,7 @@ def test_a_page_without_settings_ends(line, words):
 
 
 def test_a_port_that_is_taken_is_named(tmp_path):
-    with web_scene.served_page() as page:
+    with page_scene.served_page() as page:
         words = ("view", recorded(), "--no-browser", "--page-port", page.port)
         with started(*words, home=tmp_path) as process:
             _, err = process.communicate(timeout=60.0)
@@ -169,9 +169,9 @@ def test_a_page_beside_a_site_shows_it_commands_it_and_never_disturbs_it(tmp_pat
         bearer = {"Authorization": f"Bearer {token}"}
         page = page_of(process)
         state = wait_for(lambda: (s := got(base, "state"))["connected"] and s["epoch"] is not None and s)
-        models.StateAnswer.model_validate(state)
-        models.EpochAnswer.model_validate(got(base, f"epochs/{state['epoch']['number']}"))
-        models.RangerAnswer.model_validate(got(base, "rangers/ZY101"))
+        models.StateJson.model_validate(state)
+        models.EpochJson.model_validate(got(base, f"epochs/{state['epoch']['number']}"))
+        models.RangerJson.model_validate(got(base, "rangers/ZY101"))
         assert "catseye_connected 1.0" in httpx.get(f"{base}metrics").text
 
         def sent(path, body, headers=bearer):
@@ -181,7 +181,7 @@ def test_a_page_beside_a_site_shows_it_commands_it_and_never_disturbs_it(tmp_pat
         assert sent("commands", passive, {}).status_code == 401
         answer = sent("commands", passive)
         assert answer.status_code == 200, answer.text
-        models.CommandAnswer.model_validate(answer.json())
+        models.CommandJson.model_validate(answer.json())
         wait_for(lambda: got(base, "state")["mode"] == "passive")
         assert sent("commands", loud).status_code == 409
         assert sent("commands", active).status_code == 200

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from web_scene import TOKEN, sent_raw, served_page
+from web.page_scene import TOKEN, sent_raw, served_page
 
 import httpx  # isort: skip - after the skip of the scene
 from catseye.web import protocols  # isort: skip

@@ -5,31 +5,31 @@ import json
 
 import pytest
 
-from web_scene import DOCUMENT, TOKEN, MadeUpWatch, served_page
+from web.page_scene import DOCUMENT, TOKEN, MadeUpWatch, served_page
 
 import httpx  # isort: skip - after the skip of the scene
 
 ANSWERS = {
-    "/api/service": "ServiceAnswer",
-    "/api/site": "SiteAnswer",
-    "/api/state": "StateAnswer",
-    "/api/state?at=60635.1": "StateAnswer",
-    "/api/epochs?since=60000&until=70000&limit=10": "EpochsAnswer",
-    "/api/epochs/3": "EpochAnswer",
-    "/api/epochs/3/residuals": "ResidualsAnswer",
-    "/api/series/names": "SeriesNamesAnswer",
-    "/api/series?names=azimuth&most=10": "SeriesAnswer",
-    "/api/dropped": "DroppedAnswer",
-    "/api/shots?ranger=ZY101&status=good": "ShotsAnswer",
-    "/api/shots/41": "ShotAnswer",
-    "/api/shots/41/samples": "SamplesAnswer",
-    "/api/points/A": "PointAnswer",
-    "/api/rangers/ZY101": "RangerAnswer",
-    "/api/calibrations": "CalibrationsAnswer",
-    "/api/air?epoch=3": "AirAnswer",
-    "/api/comparison?first=3&second=3": "ComparisonAnswer",
-    "/api/surface": "SurfaceAnswer",
-    "/api/events?severity=warning": "EventsAnswer",
+    "/api/service": "ServiceJson",
+    "/api/site": "SiteJson",
+    "/api/state": "StateJson",
+    "/api/state?at=60635.1": "StateJson",
+    "/api/epochs?since=60000&until=70000&limit=10": "EpochsJson",
+    "/api/epochs/3": "EpochJson",
+    "/api/epochs/3/residuals": "ResidualsJson",
+    "/api/series/names": "SeriesNamesJson",
+    "/api/series?names=azimuth&most=10": "SeriesJson",
+    "/api/dropped": "DroppedJson",
+    "/api/shots?ranger=ZY101&status=good": "ShotsJson",
+    "/api/shots/41": "ShotJson",
+    "/api/shots/41/samples": "SamplesJson",
+    "/api/points/A": "PointJson",
+    "/api/rangers/ZY101": "RangerJson",
+    "/api/calibrations": "CalibrationsJson",
+    "/api/air?epoch=3": "AirJson",
+    "/api/comparison?first=3&second=3": "ComparisonJson",
+    "/api/surface": "SurfaceJson",
+    "/api/events?severity=warning": "EventsJson",
 }
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
 
@@ -191,5 +191,5 @@ def test_a_result_has_its_report_and_nothing_of_a_site():
 
 
 def test_the_document_is_the_committed_one(client):
-    """`PYTHONPATH=src:tests python tests/web_scene.py` writes it."""
+    """`PYTHONPATH=src:tests python tests/web/page_scene.py` writes it."""
     assert client.get("/api/openapi.json").json() == json.loads(DOCUMENT.read_text(encoding="utf-8"))

@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-import web_scene  # isort: skip - skips where the extra is absent
+from web import page_scene  # isort: skip - skips where the extra is absent
 from catseye.errors import InputError
 from catseye.service.page import PageAddress, read_settings, refuse_files
 from catseye.web import refusals as refusals_module
@@ -71,7 +71,7 @@ def test_a_fault_is_one_line_without_its_trace():
 def test_the_names_it_is_called_by(host, more, names):
     files = '"certificate": "c", "key": "k"'
     listed = ", ".join(f'"{name}"' for name in more)
-    line = f'{{"kind": "journal", "journal": "j", "listen": ["{host}", 1], "token": "{web_scene.TOKEN}", {files}, '
+    line = f'{{"kind": "journal", "journal": "j", "listen": ["{host}", 1], "token": "{page_scene.TOKEN}", {files}, '
     policy = service.policy_of(read_settings(line + f'"names": [{listed}]}}'), PageSubject("journal", "j"))
     assert policy.names == names
     assert policy.exposed is (not host.startswith("127."))
@@ -100,4 +100,4 @@ def test_a_key_with_a_password_is_refused_and_nobody_is_asked(tmp_path):
     command = f"openssl req -x509 -newkey rsa:2048 -days 2 -subj /CN=localhost -passout pass:secret -out {certificate}"
     subprocess.run([*command.split(), "-keyout", str(key)], check=True, capture_output=True)
     with pytest.raises(InputError, match="certificate or key cannot be used"):
-        refuse_files(PageAddress("0.0.0.0", 1, web_scene.TOKEN, certificate, key))
+        refuse_files(PageAddress("0.0.0.0", 1, page_scene.TOKEN, certificate, key))

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 from catseye.api.journal import mjd_argument
-from catseye.api.limits import LAST_PORT, one_of, within
-from catseye.api.pages import site_page
+from catseye.api.live.beside import site_page
+from catseye.api.live.limits import LAST_PORT, one_of, within
 from catseye.api.reading import place_of
 from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError, InputError

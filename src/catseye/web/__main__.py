@@ -7,7 +7,7 @@ from catseye.errors import CatseyeError
 
 def main() -> int:
     """Serve until standard input ends; the exit status."""
-    from catseye.api.pages import page_settings
+    from catseye.api.live.address import page_settings
     from catseye.web.refusals import printable, write_line
     from catseye.web.service import first_line, run
 

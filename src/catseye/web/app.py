@@ -11,7 +11,7 @@ from starlette.responses import Response
 from catseye.errors import ArgumentError, CatseyeError
 from catseye.web.access import AccessPolicy
 from catseye.web.answers import StaticFile, json_answer, static_files
-from catseye.web.guard import Guard
+from catseye.web.guard import PageGuard
 from catseye.web.live import router as live_router
 from catseye.web.metrics import PageMetrics
 from catseye.web.refusals import RefusalLog, printable
@@ -26,10 +26,10 @@ DESCRIPTION = (
 BODY_INVALID = 400  # of the framework: a body that is no JSON at all
 
 
-def application(subject: PageSubject, policy: AccessPolicy, refusals: RefusalLog) -> Guard:
+def application(subject: PageSubject, policy: AccessPolicy, refusals: RefusalLog) -> PageGuard:
     """ASGI application of a subject behind its guard."""
     metrics = PageMetrics(subject, refusals)
-    return Guard(routes(subject, policy, refusals, metrics), policy, refusals, metrics.measured)
+    return PageGuard(routes(subject, policy, refusals, metrics), policy, refusals, metrics.measured)
 
 
 def routes(subject: PageSubject, policy: AccessPolicy, refusals: RefusalLog, metrics: PageMetrics) -> FastAPI:

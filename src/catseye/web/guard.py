@@ -18,7 +18,7 @@ Application = Callable[[Any, Receive, Send], Awaitable[None]]
 Measured = Callable[[str, int, float], None]
 
 
-class Guard:
+class PageGuard:
     """ASGI application that lets through what the policy allows.
 
     app        the routes
@@ -103,7 +103,7 @@ class _Answer:
 
 
 def error_body(text: str) -> bytes:
-    """JSON of an error."""
+    """JSON of an error, in UTF-8."""
     return json.dumps({"error": text}).encode()
 
 

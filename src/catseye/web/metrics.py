@@ -33,12 +33,12 @@ class PageMetrics:
         self._registry.register(_SiteCollector(subject))
 
     def measured(self, route: str, status: int, seconds: float) -> None:
-        """Count an answer."""
+        """Count an answer and its time."""
         self._requests.labels(route, str(status)).inc()
         self._seconds.observe(seconds)
 
     def answer(self) -> Response:
-        """Text of all metrics."""
+        """Answer with the text of all metrics."""
         return Response(generate_latest(self._registry), 200, None, CONTENT_TYPE_LATEST)
 
 

@@ -25,13 +25,13 @@ class Shape(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class ErrorAnswer(Shape):
-    """Refusal in one line."""
+class ErrorJson(Shape):
+    """Refusal in one line of text."""
 
     error: str
 
 
-class ServiceAnswer(Shape):
+class ServiceJson(Shape):
     """The service: its subject, and permissions."""
 
     version: str
@@ -43,7 +43,7 @@ class ServiceAnswer(Shape):
     now: Mjd
 
 
-class SiteRanger(Shape):
+class SiteRangerJson(Shape):
     """Ranger of a site and its place, m."""
 
     name: str
@@ -53,8 +53,8 @@ class SiteRanger(Shape):
     kind: Literal["ground", "feed", "other"]
 
 
-class SiteTargets(Shape):
-    """Targets of a site, m."""
+class SiteTargetsJson(Shape):
+    """Targets of a site and their places, m."""
 
     name: Names
     x: Column
@@ -63,7 +63,7 @@ class SiteTargets(Shape):
     body: Names
 
 
-class Outline(Shape):
+class OutlineJson(Shape):
     """Line of the antenna's structure, m."""
 
     name: str
@@ -73,8 +73,8 @@ class Outline(Shape):
     z: Column
 
 
-class RunAnswer(Shape):
-    """Run of a journal."""
+class RunJson(Shape):
+    """Run of a journal with its span."""
 
     run: int
     uuid: str
@@ -82,14 +82,14 @@ class RunAnswer(Shape):
     ended: Number
 
 
-class Direction(Shape):
+class DirectionJson(Shape):
     """Azimuth and elevation, rad."""
 
     azimuth: Number
     elevation: Number
 
 
-class SiteAnswer(Shape):
+class SiteJson(Shape):
     """Map of a site, its journal's runs and the span of its history."""
 
     name: str
@@ -97,23 +97,23 @@ class SiteAnswer(Shape):
     longitude: Number = Field(description="rad, east positive")
     height: Number = Field(description="m")
     time_zone: str | None = Field(description="IANA")
-    posture: Direction | None = Field(default=None, description="of the records, for which the structure is drawn")
-    rangers: list[SiteRanger]
-    targets: SiteTargets
-    structure: list[Outline]
-    runs: list[RunAnswer]
+    posture: DirectionJson | None = Field(default=None, description="of the records, for which the structure is drawn")
+    rangers: list[SiteRangerJson]
+    targets: SiteTargetsJson
+    structure: list[OutlineJson]
+    runs: list[RunJson]
     since: Number
     until: Number
 
 
-class ShotCounts(Shape):
+class ShotCountsJson(Shape):
     """Shots that the coordinator numbered, and those that its journal holds durably."""
 
     numbered: int | None
     acknowledged: int | None
 
 
-class ProblemAnswer(Shape):
+class ProblemJson(Shape):
     """Alarm of a site, and who has acknowledged or shelved it."""
 
     id: str
@@ -126,8 +126,8 @@ class ProblemAnswer(Shape):
     shelved_until: Number
 
 
-class EpochSummaryAnswer(Shape):
-    """Epoch in a line."""
+class EpochSummaryJson(Shape):
+    """Summary of an epoch: counts, verdict, posture."""
 
     number: int
     mjd: Number
@@ -145,7 +145,7 @@ class EpochSummaryAnswer(Shape):
     seq: int | None = Field(default=None, description="number of the entry in the journal")
 
 
-class PostureAnswer(Direction):
+class PostureJson(DirectionJson):
     """Posture of the antenna, rad and rad/s."""
 
     mjd: Mjd
@@ -153,7 +153,7 @@ class PostureAnswer(Direction):
     elevation_rate: Number
 
 
-class WeatherAnswer(Shape):
+class WeatherJson(Shape):
     """Reading of a weather station."""
 
     station: str
@@ -163,14 +163,14 @@ class WeatherAnswer(Shape):
     humidity_percent: Number
 
 
-class SunAnswer(Direction):
+class SunJson(DirectionJson):
     """Place of the Sun and half angle of the cone that is avoided, rad."""
 
     cone: Number
     avoided: bool | None = None
 
 
-class LastShot(Shape):
+class LastShotJson(Shape):
     """Last shot of a ranger, m."""
 
     number: int | None
@@ -181,7 +181,7 @@ class LastShot(Shape):
     misfit: Number
 
 
-class RangerRow(Shape):
+class RangerRowJson(Shape):
     """Ranger in a line of the state."""
 
     name: str
@@ -193,12 +193,12 @@ class RangerRow(Shape):
     shots: int | None
     failures: int | None
     stream: Any
-    last: LastShot | None
+    last: LastShotJson | None
     next: str | None = Field(description="target of the next shot")
     next_mjd: Number = None
 
 
-class StateAnswer(Shape):
+class StateJson(Shape):
     """State of a site: live, or of the journal at an instant."""
 
     mjd: Number = Field(description="of the site's clock; null before its first word")
@@ -209,29 +209,29 @@ class StateAnswer(Shape):
     word: str | None
     mode: str | None
     round: int | None
-    shots: ShotCounts | None
+    shots: ShotCountsJson | None
     telescope: str | None = None
     clock: str | None
     disk: str | None
     journal: str | None
     lease: str | None = Field(description="name of its holder")
-    problems: list[ProblemAnswer]
+    problems: list[ProblemJson]
     verdict: Verdict
     verdict_text: str | None = None
-    epoch: EpochSummaryAnswer | None
-    posture: PostureAnswer | None
-    weather: list[WeatherAnswer]
-    sun: SunAnswer | None
-    rangers: list[RangerRow]
+    epoch: EpochSummaryJson | None
+    posture: PostureJson | None
+    weather: list[WeatherJson]
+    sun: SunJson | None
+    rangers: list[RangerRowJson]
 
 
-class EpochsAnswer(Shape):
-    """Epochs, oldest first."""
+class EpochsJson(Shape):
+    """Summaries of epochs, oldest first."""
 
-    epochs: list[EpochSummaryAnswer]
+    epochs: list[EpochSummaryJson]
 
 
-class Covariance(Shape):
+class CovarianceJson(Shape):
     """Covariance of each point, m^2."""
 
     xx: Column
@@ -242,19 +242,19 @@ class Covariance(Shape):
     zz: Column
 
 
-class EpochPoints(Shape):
-    """Points of an epoch, m."""
+class EpochPointsJson(Shape):
+    """Points of an epoch with covariance, m."""
 
     name: Names
     body: Names
     x: Column
     y: Column
     z: Column
-    covariance: Covariance
+    covariance: CovarianceJson
     shots: list[int | None]
 
 
-class Beams(Shape):
+class BeamsJson(Shape):
     """Shots of an epoch as beams, with their standardised residuals."""
 
     ranger: Names
@@ -263,7 +263,7 @@ class Beams(Shape):
     w: Column
 
 
-class NamedValues(Shape):
+class NamedValuesJson(Shape):
     """Values by name with their standard uncertainties."""
 
     name: Names
@@ -271,15 +271,15 @@ class NamedValues(Shape):
     u: Column
 
 
-class RangerZeros(Shape):
-    """Zero of each ranger, m."""
+class RangerZerosJson(Shape):
+    """Zero of each ranger with its u, m."""
 
     ranger: Names
     value: Column
     u: Column
 
 
-class RejectedShot(Shape):
+class RejectedShotJson(Shape):
     """Shot that an epoch does not use."""
 
     shot: int | None
@@ -289,23 +289,23 @@ class RejectedShot(Shape):
     reason: str
 
 
-class EpochAnswer(EpochSummaryAnswer):
+class EpochJson(EpochSummaryJson):
     """Epoch: points with covariance, beams, structure at its posture, air, zeros, doubts."""
 
-    points: EpochPoints  # type: ignore[assignment]  # the summary counts them
-    beams: Beams
-    structure: list[Outline]
-    air: NamedValues
-    zeros: RangerZeros
+    points: EpochPointsJson  # type: ignore[assignment]  # the summary counts them
+    beams: BeamsJson
+    structure: list[OutlineJson]
+    air: NamedValuesJson
+    zeros: RangerZerosJson
     jitter_mm: dict[str, Number] | None
     doubts: list[str]
     notes: list[str]
     biases: dict[str, Any] | None
-    rejected: list[RejectedShot]  # type: ignore[assignment]  # the summary counts them
+    rejected: list[RejectedShotJson]  # type: ignore[assignment]  # the summary counts them
     pose: dict[str, Any] | None
 
 
-class ResidualsAnswer(Shape):
+class ResidualsJson(Shape):
     """Residuals of an epoch's shots, m; w is standardised."""
 
     shot: list[int | None]
@@ -320,7 +320,7 @@ class ResidualsAnswer(Shape):
     by: str | None = None
 
 
-class SeriesName(Shape):
+class SeriesNameJson(Shape):
     """Series that can be asked for."""
 
     name: str
@@ -328,13 +328,13 @@ class SeriesName(Shape):
     unit: str
 
 
-class SeriesNamesAnswer(Shape):
-    """Series that are there."""
+class SeriesNamesJson(Shape):
+    """Names of all series, with labels and units."""
 
-    names: list[SeriesName]
+    names: list[SeriesNameJson]
 
 
-class Series(SeriesName):
+class SeriesLineJson(SeriesNameJson):
     """One quantity over time; low and high are the least and the largest of a bin."""
 
     mjd: Column
@@ -344,14 +344,14 @@ class Series(SeriesName):
     high: Column | None
 
 
-class SeriesAnswer(Shape):
+class SeriesJson(Shape):
     """Series on one time axis."""
 
-    names: list[Series]
+    names: list[SeriesLineJson]
     gaps: Number = Field(description="s without a value from which on a line breaks")
 
 
-class DroppedAnswer(Shape):
+class DroppedJson(Shape):
     """Map of dropped channels: shots of each ranger in each bin."""
 
     rangers: Names
@@ -361,8 +361,8 @@ class DroppedAnswer(Shape):
     failed: list[list[int]]
 
 
-class ShotsAnswer(Shape):
-    """Shots as columns, m."""
+class ShotsJson(Shape):
+    """Shots as columns, oldest first, m."""
 
     number: list[int | None]
     mjd: Column
@@ -374,7 +374,7 @@ class ShotsAnswer(Shape):
     misfit: Column
 
 
-class CorrectionStep(Shape):
+class CorrectionStepJson(Shape):
     """Step from phase to range."""
 
     name: str
@@ -382,7 +382,7 @@ class CorrectionStep(Shape):
     unit: str
 
 
-class CertificateAnswer(Shape):
+class CertificateJson(Shape):
     """Certificate behind a value."""
 
     instrument: str
@@ -397,7 +397,7 @@ class CertificateAnswer(Shape):
     report: str | None = None
 
 
-class ShotAnswer(Shape):
+class ShotJson(Shape):
     """Shot with all that went into its range."""
 
     number: int
@@ -416,21 +416,21 @@ class ShotAnswer(Shape):
     samples_per_cycle: int | None = None
     if_hz: Number = None
     epoch: int | None
-    correction: list[CorrectionStep]
-    weather: list[WeatherAnswer]
-    posture: PostureAnswer | None
-    certificate: CertificateAnswer | None
+    correction: list[CorrectionStepJson]
+    weather: list[WeatherJson]
+    posture: PostureJson | None
+    certificate: CertificateJson | None
     has_samples: bool
 
 
-class Spectrum(Shape):
+class SpectrumJson(Shape):
     """Amplitude spectrum of a buffer."""
 
     frequency_hz: Column
     amplitude_v: Column
 
 
-class Harmonic(Shape):
+class HarmonicJson(Shape):
     """Harmonic of the modulation."""
 
     n: int
@@ -438,26 +438,26 @@ class Harmonic(Shape):
     amplitude_v: Number
 
 
-class CyclePhase(Shape):
+class CyclePhaseJson(Shape):
     """Phase of each cycle: s and rad."""
 
     t: Column
     phase: Column
 
 
-class SamplesAnswer(Shape):
+class SamplesJson(Shape):
     """Samples of a shot and its spectrum."""
 
     number: int | None = None
     sample_rate_hz: Number
     volts: Column
-    spectrum: Spectrum
-    harmonics: list[Harmonic]
-    cycle_phase: CyclePhase
+    spectrum: SpectrumJson
+    harmonics: list[HarmonicJson]
+    cycle_phase: CyclePhaseJson
     fit: dict[str, Number]
 
 
-class PointAnswer(Shape):
+class PointJson(Shape):
     """History of a point, m, and its last shots."""
 
     name: str
@@ -467,11 +467,11 @@ class PointAnswer(Shape):
     x: Column
     y: Column
     z: Column
-    covariance: Covariance
-    shots: ShotsAnswer
+    covariance: CovarianceJson
+    shots: ShotsJson
 
 
-class RangerAnswer(BaseModel):
+class RangerJson(BaseModel):
     """Ranger: its line of the state, its station, servo, certificates and recent commands."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
@@ -485,8 +485,8 @@ class RangerAnswer(BaseModel):
     commands: Any
 
 
-class InstrumentAnswer(CertificateAnswer):
-    """Calibrated instrument."""
+class InstrumentJson(CertificateJson):
+    """Calibrated instrument and its certificate."""
 
     kind: str
     quantity: str = ""
@@ -495,15 +495,15 @@ class InstrumentAnswer(CertificateAnswer):
     unit: str | None
 
 
-class CalibrationsAnswer(Shape):
+class CalibrationsJson(Shape):
     """Calibrations behind a site's numbers."""
 
     mjd: Number = None
-    instruments: list[InstrumentAnswer]
+    instruments: list[InstrumentJson]
 
 
-class AirPaths(Shape):
-    """Air along each path."""
+class AirPathsJson(Shape):
+    """Air along each path of an epoch."""
 
     ranger: Names
     target: Names
@@ -513,18 +513,18 @@ class AirPaths(Shape):
     temperature_c: Column
 
 
-class AirAnswer(Shape):
-    """Air of an epoch."""
+class AirJson(Shape):
+    """Air of an epoch: paths, profile, stations."""
 
     epoch: int | None = None
     mjd: Number = None
     refractivity_ppm: Number = None
-    paths: AirPaths
+    paths: AirPathsJson
     profile: dict[str, Any] | None
     stations: list[Any]
 
 
-class ComparisonAnswer(BaseModel):
+class ComparisonJson(BaseModel):
     """Points of two epochs, second less first, m."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
@@ -533,12 +533,12 @@ class ComparisonAnswer(BaseModel):
     dx: Column
     dy: Column
     dz: Column
-    covariance: Covariance
+    covariance: CovarianceJson
     significant: list[bool | None]
     verdict: Verdict
 
 
-class SurfacePoints(Shape):
+class SurfacePointsJson(Shape):
     """Deviations of the surface, m."""
 
     name: Names
@@ -549,7 +549,7 @@ class SurfacePoints(Shape):
     u: Column
 
 
-class Actuators(Shape):
+class ActuatorsJson(Shape):
     """Actuators of the surface, m."""
 
     name: Names
@@ -558,8 +558,8 @@ class Actuators(Shape):
     value: Column
 
 
-class ZernikeTerm(Shape):
-    """Zernike coefficient, m."""
+class ZernikeTermJson(Shape):
+    """Zernike coefficient with its u, m."""
 
     n: int
     m: int
@@ -569,7 +569,7 @@ class ZernikeTerm(Shape):
     u: Number
 
 
-class Aperture(Shape):
+class ApertureJson(Shape):
     """Circle over which the Zernike polynomials are orthogonal, m."""
 
     x: Number
@@ -577,21 +577,21 @@ class Aperture(Shape):
     radius: Number
 
 
-class SurfaceAnswer(Shape):
-    """Surface of an epoch."""
+class SurfaceJson(Shape):
+    """Surface of the dish by an epoch."""
 
     epoch: int | None = None
-    points: SurfacePoints
-    actuators: Actuators | None
-    aperture: Aperture | None = None
-    zernike: list[ZernikeTerm]
+    points: SurfacePointsJson
+    actuators: ActuatorsJson | None
+    aperture: ApertureJson | None = None
+    zernike: list[ZernikeTermJson]
     rms: Number
     focal_length: Number = None
     verdict: Verdict
     verdict_text: str | None = None
 
 
-class EventsAnswer(Shape):
+class EventsJson(Shape):
     """Events as columns, oldest first."""
 
     mjd: Column
@@ -609,7 +609,7 @@ class CommandBody(Shape):
     who: Who
 
 
-class CommandAnswer(Shape):
+class CommandJson(Shape):
     """Outcome of a command, in the coordinator's words."""
 
     command: str
@@ -625,8 +625,8 @@ class ConsoleBody(Shape):
     who: Who
 
 
-class ConsoleAnswer(Shape):
-    """Answers of a ranger."""
+class ConsoleJson(Shape):
+    """Answers of a ranger to one line."""
 
     replies: list[str]
 
@@ -643,7 +643,7 @@ class ShelfBody(WhoBody):
     minutes: float = Field(gt=0.0, le=1440.0)
 
 
-class Report(BaseModel):
+class ReportJson(BaseModel):
     """Report of a finished result, as its page holds it."""
 
     model_config = ConfigDict(frozen=True, extra="allow")

@@ -20,7 +20,7 @@ LARGEST = 2**53  # integers beyond are no numbers of JSON
 MOST_NAMES = 64  # of series in an answer
 LONGEST_COMMAND = 15.0  # s until a command's outcome is unknown
 ERRORS: dict[int | str, dict[str, Any]] = {
-    status: {"model": models.ErrorAnswer, "description": words}
+    status: {"model": models.ErrorJson, "description": words}
     for status, words in {
         401: "No token, or a wrong one",
         403: "Wrong Host or Origin, or no commands here",
@@ -30,8 +30,8 @@ ERRORS: dict[int | str, dict[str, Any]] = {
     }.items()
 }
 COMMAND_ERRORS = ERRORS | {
-    409: {"model": models.ErrorAnswer, "description": "The site refuses; its words"},
-    413: {"model": models.ErrorAnswer, "description": "Too long a body"},
+    409: {"model": models.ErrorJson, "description": "The site refuses; its words"},
+    413: {"model": models.ErrorJson, "description": "Too long a body"},
 }
 At = Annotated[float | None, Query(ge=0.0, le=LATEST_MJD, allow_inf_nan=False, description="MJD; none: now")]
 Since = Annotated[float | None, Query(ge=0.0, le=LATEST_MJD, allow_inf_nan=False, description="MJD of the first")]
@@ -76,45 +76,45 @@ async def done(request: Request, work: Callable[["SiteWatch"], Awaitable[Any]]) 
         raise HTTPException(409, str(problem)) from problem
 
 
-@router.get("/service", tags=["service"], summary="The service", response_model=models.ServiceAnswer)
+@router.get("/service", tags=["service"], summary="The service", response_model=models.ServiceJson)
 async def service(request: Request) -> Response:
     state = request.app.state
     return json_answer(state.subject.to_object(needs_token=state.policy.exposed))
 
 
-@router.get("/site", tags=["site"], summary="Map of the site", response_model=models.SiteAnswer)
+@router.get("/site", tags=["site"], summary="Map of the site", response_model=models.SiteJson)
 async def site(request: Request) -> Response:
     return await answer(request, "site")
 
 
-@router.get("/state", tags=["site"], summary="State of the site", response_model=models.StateAnswer)
+@router.get("/state", tags=["site"], summary="State of the site", response_model=models.StateJson)
 async def state(request: Request, at: At = None) -> Response:
     return await answer(request, "state", at)
 
 
-@router.get("/epochs", tags=["site"], summary="Epochs", response_model=models.EpochsAnswer)
+@router.get("/epochs", tags=["site"], summary="Epochs", response_model=models.EpochsJson)
 async def epochs(request: Request, since: Since = None, until: Until = None, limit: Limit = 200) -> Response:
     return await answer(request, "epochs", since, until, limit)
 
 
-@router.get("/epochs/{number}", tags=["site"], summary="An epoch", response_model=models.EpochAnswer)
+@router.get("/epochs/{number}", tags=["site"], summary="An epoch", response_model=models.EpochJson)
 async def epoch(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
     return await answer(request, "epoch", number, run, at)
 
 
 @router.get(
-    "/epochs/{number}/residuals", tags=["site"], summary="Residuals of an epoch", response_model=models.ResidualsAnswer
+    "/epochs/{number}/residuals", tags=["site"], summary="Residuals of an epoch", response_model=models.ResidualsJson
 )
 async def residuals(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
     return await answer(request, "residuals", number, run, at)
 
 
-@router.get("/series/names", tags=["site"], summary="Series there are", response_model=models.SeriesNamesAnswer)
+@router.get("/series/names", tags=["site"], summary="Series there are", response_model=models.SeriesNamesJson)
 async def series_names(request: Request) -> Response:
     return await answer(request, "series_names")
 
 
-@router.get("/series", tags=["site"], summary="Series over time", response_model=models.SeriesAnswer)
+@router.get("/series", tags=["site"], summary="Series over time", response_model=models.SeriesJson)
 async def series(
     request: Request, names: SeriesNames, since: Since = None, until: Until = None, most: Most = 2000
 ) -> Response:
@@ -124,7 +124,7 @@ async def series(
     return await answer(request, "series", chosen, since, until, most)
 
 
-@router.get("/dropped", tags=["site"], summary="Map of dropped channels", response_model=models.DroppedAnswer)
+@router.get("/dropped", tags=["site"], summary="Map of dropped channels", response_model=models.DroppedJson)
 async def dropped(
     request: Request,
     since: Since = None,
@@ -134,7 +134,7 @@ async def dropped(
     return await answer(request, "dropped", since, until, bins)
 
 
-@router.get("/shots", tags=["site"], summary="Shots", response_model=models.ShotsAnswer)
+@router.get("/shots", tags=["site"], summary="Shots", response_model=models.ShotsJson)
 async def shots(
     request: Request,
     ranger: Text = None,
@@ -149,37 +149,37 @@ async def shots(
     return await answer(request, "shots", **named, since=since, until=until, limit=limit)
 
 
-@router.get("/shots/{number}", tags=["site"], summary="A shot", response_model=models.ShotAnswer)
+@router.get("/shots/{number}", tags=["site"], summary="A shot", response_model=models.ShotJson)
 async def shot(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
     return await answer(request, "shot", number, run, at)
 
 
-@router.get("/shots/{number}/samples", tags=["site"], summary="Samples of a shot", response_model=models.SamplesAnswer)
+@router.get("/shots/{number}/samples", tags=["site"], summary="Samples of a shot", response_model=models.SamplesJson)
 async def samples(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
     return await answer(request, "samples", number, run, at)
 
 
-@router.get("/points/{name}", tags=["site"], summary="A point", response_model=models.PointAnswer)
+@router.get("/points/{name}", tags=["site"], summary="A point", response_model=models.PointJson)
 async def point(request: Request, name: Name, since: Since = None, until: Until = None) -> Response:
     return await answer(request, "point", name, since, until)
 
 
-@router.get("/rangers/{name}", tags=["site"], summary="A ranger", response_model=models.RangerAnswer)
+@router.get("/rangers/{name}", tags=["site"], summary="A ranger", response_model=models.RangerJson)
 async def ranger(request: Request, name: Name, at: At = None) -> Response:
     return await answer(request, "ranger", name, at)
 
 
-@router.get("/calibrations", tags=["site"], summary="Calibrations", response_model=models.CalibrationsAnswer)
+@router.get("/calibrations", tags=["site"], summary="Calibrations", response_model=models.CalibrationsJson)
 async def calibrations(request: Request, at: At = None) -> Response:
     return await answer(request, "calibrations", at)
 
 
-@router.get("/air", tags=["site"], summary="Air along each path", response_model=models.AirAnswer)
+@router.get("/air", tags=["site"], summary="Air along each path", response_model=models.AirJson)
 async def air(request: Request, epoch: Integer = None, run: Integer = None, at: At = None) -> Response:
     return await answer(request, "air", epoch, run, at)
 
 
-@router.get("/comparison", tags=["site"], summary="Two epochs compared", response_model=models.ComparisonAnswer)
+@router.get("/comparison", tags=["site"], summary="Two epochs compared", response_model=models.ComparisonJson)
 async def comparison(
     request: Request,
     first: Annotated[int, Query(ge=0, le=LARGEST)],
@@ -190,12 +190,12 @@ async def comparison(
     return await answer(request, "comparison", first, second, run, at)
 
 
-@router.get("/surface", tags=["site"], summary="Surface of an epoch", response_model=models.SurfaceAnswer)
+@router.get("/surface", tags=["site"], summary="Surface of an epoch", response_model=models.SurfaceJson)
 async def surface(request: Request, epoch: Integer = None, run: Integer = None, at: At = None) -> Response:
     return await answer(request, "surface", epoch, run, at)
 
 
-@router.get("/events", tags=["site"], summary="Events", response_model=models.EventsAnswer)
+@router.get("/events", tags=["site"], summary="Events", response_model=models.EventsJson)
 async def events(
     request: Request,
     since: Since = None,
@@ -206,7 +206,7 @@ async def events(
     return await answer(request, "events", since, until, severity, limit)
 
 
-@router.get("/report", tags=["result"], summary="Report of a result", response_model=models.Report)
+@router.get("/report", tags=["result"], summary="Report of a result", response_model=models.ReportJson)
 async def report(request: Request) -> Response:
     subject: PageSubject = request.app.state.subject
     if subject.report is None:
@@ -214,26 +214,26 @@ async def report(request: Request) -> Response:
     return await subject.desk.answer(request, lambda: subject.report)
 
 
-@command_router.post("/commands", summary="Command the coordinator", response_model=models.CommandAnswer)
+@command_router.post("/commands", summary="Command the coordinator", response_model=models.CommandJson)
 async def command(request: Request, body: models.CommandBody) -> Response:
     return await done(request, lambda watch: watch.command(body.command, body.parameters, body.who))
 
 
-@command_router.post("/console/{ranger}", summary="A line to a ranger", response_model=models.ConsoleAnswer)
+@command_router.post("/console/{ranger}", summary="A line to a ranger", response_model=models.ConsoleJson)
 async def console(request: Request, ranger: Name, body: models.ConsoleBody) -> Response:
     return await done(request, lambda watch: watch.console(ranger, body.line, body.who))
 
 
-@command_router.post("/alarms/{alarm}/acknowledge", summary="Acknowledge an alarm", response_model=models.CommandAnswer)
+@command_router.post("/alarms/{alarm}/acknowledge", summary="Acknowledge an alarm", response_model=models.CommandJson)
 async def acknowledge(request: Request, alarm: Name, body: models.WhoBody) -> Response:
     return await done(request, lambda watch: watch.acknowledge(alarm, body.who))
 
 
-@command_router.post("/alarms/{alarm}/shelve", summary="Shelve an alarm", response_model=models.CommandAnswer)
+@command_router.post("/alarms/{alarm}/shelve", summary="Shelve an alarm", response_model=models.CommandJson)
 async def shelve(request: Request, alarm: Name, body: models.ShelfBody) -> Response:
     return await done(request, lambda watch: watch.shelve(alarm, body.who, body.minutes))
 
 
-@command_router.post("/alarms/{alarm}/unshelve", summary="Unshelve an alarm", response_model=models.CommandAnswer)
+@command_router.post("/alarms/{alarm}/unshelve", summary="Unshelve an alarm", response_model=models.CommandJson)
 async def unshelve(request: Request, alarm: Name, body: models.WhoBody) -> Response:
     return await done(request, lambda watch: watch.unshelve(alarm, body.who))

@@ -20,7 +20,7 @@ from catseye.web.refusals import RefusalLog
 from catseye.web.subject import PageSubject, subject_of
 
 if TYPE_CHECKING:
-    from catseye.api.pages import PageSettings
+    from catseye.api.live.address import PageSettings
 
 SEND_BUFFER = 262_144  # bytes of a connection in the kernel: a client that takes nothing is seen after so many
 LONGEST_SETTINGS = 65_536  # bytes

@@ -11,7 +11,7 @@ from catseye.web.answers import QueryDesk
 from catseye.web.feed import LiveFeed
 
 if TYPE_CHECKING:
-    from catseye.api.pages import PageSettings
+    from catseye.api.live.address import PageSettings
     from catseye.api.watching import SiteWatch
 
 UNIX_EPOCH, DAY = 40_587.0, 86_400.0  # MJD; s

@@ -23,7 +23,7 @@ def view(
     quiet: Quiet = False,
 ) -> None:
     """A result or a journal in a browser, until Ctrl-C."""
-    from catseye.api.pages import view as run
+    from catseye.api.live.view import view as run
 
     number = run(
         source,

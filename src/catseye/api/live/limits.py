@@ -1,4 +1,4 @@
-"""Limits of arguments that several jobs share."""
+"""Limits of arguments that the jobs of a living site share."""
 
 import math
 from collections.abc import Sequence

@@ -10,7 +10,7 @@ import urllib.request
 
 import pytest
 
-from catseye.api.pages import page_settings
+from catseye.api.live.address import page_settings
 from catseye.errors import ArgumentError, InputError
 from repository import ROOT
 
