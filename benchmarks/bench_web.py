@@ -1,6 +1,7 @@
 """The page beside a busy site: its share of a core, and the time from shot to durable with and without it.
 
 python benchmarks/bench_web.py [--seconds 30] [--clients 50] [--rangers 18] [--json]
+python benchmarks/bench_web.py --lasting 30 [--clients 50]
 
 18 rangers stream 128 ms buffers back to back to a coordinator with a journal, as in bench_live.py; the site has Green
 Bank's 2268 targets. In one run: without a page, with one that nobody looks at, with one client, with 50 of which one
@@ -8,6 +9,9 @@ takes nothing, and without a page again. Clients are in a process of their own a
 core is the page's process; the delay, from the end of a buffer until its entry is durable, is the coordinator's, whose
 ratio tells if the page slows the site. First page: the time and the bytes of all that a browser asks for before it
 shows the site.
+
+`--lasting` runs so many minutes with all clients, and prints the page's memory each minute and its growth in the last
+two thirds.
 """
 
 import argparse
@@ -23,7 +27,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from web.busy_scene import busy_site, cpu_of, listening_to, memory_of, page_of
+from web.busy_scene import LOOK, busy_site, cpu_of, growth_of, listening_to, memory_of, memory_over, page_of
 
 SETTLED = 3.0  # s after clients came
 ASSET = re.compile(r'(?:src|href)="(/[^"]+)"')
@@ -94,7 +98,13 @@ def main():
     parser.add_argument("--clients", type=int, default=50)
     parser.add_argument("--rangers", type=int, default=18)
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--lasting", type=float, metavar="MINUTES")
     options = parser.parse_args()
+    if options.lasting is not None:
+        memory, counts = asyncio.run(memory_over(options.lasting, clients=options.clients))
+        minutes = ", ".join(f"{mb:.2f}" for mb in memory[:: round(60.0 / LOOK)])
+        sys.stdout.write(f"memory each minute, MB: {minutes}\ngrowth {growth_of(memory):.2f} MB; {counts}\n")
+        return
     found = asyncio.run(measured(options))
     if options.json:
         sys.stdout.write(json.dumps(found, indent=1) + "\n")

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -21,6 +22,7 @@ from repository import ROOT
 
 TICK = 864e-6  # s
 LONGEST_START, SETTLED = 90.0, 14.0  # s: the round that was planned before the streams comes to its end
+LOOK = 5.0  # s between two looks at the memory
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 
 
@@ -139,3 +141,20 @@ def memory_of(pid):
     """Resident memory of a process, MB."""
     lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
     return int(next(line for line in lines if line.startswith("VmRSS")).split()[1]) / 1024.0
+
+
+async def memory_over(minutes, *, clients=50):
+    """Resident memory of the page each 5 s, MB, and what its clients counted; one of them takes nothing."""
+    async with busy_site(keep_buffers=False) as busy, page_of(busy) as page:
+        with listening_to(page.address.port, clients, stuck=1) as counts:
+            rows = []
+            for _ in range(round(60.0 * minutes / LOOK)):
+                await asyncio.sleep(LOOK)
+                rows.append(memory_of(page.child.pid))
+            return rows, await counts()
+
+
+def growth_of(rows):
+    """Growth of the memory in the last two thirds, MB, by the medians of a minute at both ends."""
+    third, minute = len(rows) // 3, min(round(60.0 / LOOK), len(rows) // 3)
+    return statistics.median(rows[-minute:]) - statistics.median(rows[third : third + minute])
