@@ -251,7 +251,7 @@ def _of_rangers(state: str, names: Sequence[str]) -> StandingProblem:
 
 
 def _of_ranger(state: str, name: str) -> StandingProblem:
-    """Problem of one ranger."""
+    """Problem of one ranger by itself."""
     return StandingProblem(f"{_word_of(state)}:{name}", WRONG[state], f"{name}: {state}")
 
 

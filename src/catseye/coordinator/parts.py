@@ -138,7 +138,7 @@ class RequestGuard(Protocol):
         ...
 
     def sun_zone(self, now_ticks: int) -> SunZone:
-        """The Sun over the site."""
+        """The Sun over the site now, and its cone."""
         ...
 
     def watch(self, now_ticks: int, counts: Mapping[str, tuple[float, float]]) -> Sequence[SafetyAlarm]:

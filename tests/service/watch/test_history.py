@@ -19,6 +19,7 @@ from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture, Li
 from catseye.service.settings import live_settings
 from catseye.simulator.clock.world_clock import ManualClock
 from cli.living_scene import recorded
+from journal_scene import PostgresServer
 
 
 @pytest.fixture(scope="module")
@@ -395,6 +396,54 @@ def test_run_in_several_files_is_one(tmp_path, entries, monkeypatch):
     assert watch.samples(1)["volts"] == whole.samples(1)["volts"]
     at = whole.epochs()["epochs"][0]["mjd"]
     assert watch.state(at)["rangers"] == whole.state(at)["rangers"]
+
+
+@pytest.fixture(scope="module")
+def server():
+    """A PostgreSQL server, where one is installed."""
+    pytest.importorskip("psycopg", reason="psycopg is not installed: the extra catseye[postgresql]")
+    try:
+        made = PostgresServer()
+    except FileNotFoundError as problem:
+        pytest.skip(str(problem))
+    yield made
+    made.stop()
+
+
+def test_journal_of_a_server_gives_the_same_answers(server, entries, watch):
+    place = server.database("watched")
+    with written(place) as journal:
+        for entry in entries:
+            journal.append(entry)
+        journal.append().result(60.0)
+    other = watch_journal(place)
+    number = watch.epochs()["epochs"][-1]["number"]
+    names = [row["name"] for row in watch.series_names()["names"]]
+    kinds = sorted({name.partition(":")[0] for name in names})
+    chosen = [next(name for name in names if name.partition(":")[0] == kind) for kind in kinds]
+    at = watch.epochs()["epochs"][0]["mjd"]
+    point = watch.epoch(number)["points"]["name"][5]
+    for answer in (
+        lambda w: w.shots(limit=20_000),
+        lambda w: w.shots(ranger="ZY101", status="used"),
+        lambda w: w.epoch(number),
+        lambda w: w.residuals(number),
+        lambda w: w.series_names(),
+        lambda w: w.series(chosen),
+        lambda w: w.dropped(bins=7)["good"],
+        lambda w: w.point(point),
+        lambda w: w.ranger("ZY101", at)["commands"],
+        lambda w: w.state(at)["rangers"],
+        lambda w: w.samples(3)["volts"],
+        lambda w: w.events(severity="debug"),
+    ):
+        assert jsoned(answer(other)) == jsoned(answer(watch))
+    for few, same in zip(other.series(chosen, most=5)["names"], watch.series(chosen, most=5)["names"], strict=True):
+        assert few["value"] == pytest.approx(same["value"])
+        assert few["low"] == same["low"]
+    assert (
+        other.dropped(since=at - 1.0, until=at + 1.0)["good"] == watch.dropped(since=at - 1.0, until=at + 1.0)["good"]
+    )
 
 
 def test_missing_journal_is_refused_and_a_site_waits_for_it(tmp_path):

@@ -178,13 +178,34 @@ def test_without_a_journal_the_last_hour_is_in_memory():
             site.ziy.drop("ZY102")
             await asyncio.sleep(0.1)
             assert site.watch.events()["kind"][-1] == "dropped"
+            site.ziy.intake.take(weather())
+            await asyncio.sleep(0.1)
+            names = [row["name"] for row in site.watch.series_names()["names"]]
+            assert {name.partition(":")[0] for name in names} == {
+                *("range", "correction", "temperature", "pressure", "humidity"),
+                *("azimuth", "elevation", "refractivity", "variance_factor"),
+            }
+            series = {row["name"]: row for row in site.watch.series(names)["names"]}
+            assert series["range:ZY101:ZG11"]["value"][0] == 80.0
+            assert series["range:ZY101:ZG11"]["u"][0] == 3e-5
+            assert series["temperature:WX1"]["value"] == [10.0]
+            assert len(series["azimuth"]["mjd"]) > 5
+            assert len(site.watch.series(["azimuth"], most=4)["names"][0]["mjd"]) == 4
+            later = series["azimuth"]["mjd"][3]
+            assert site.watch.series(["azimuth"], since=later)["names"][0]["mjd"] == series["azimuth"]["mjd"][3:]
+            dropped = site.watch.dropped(bins=4)
+            row = dropped["rangers"].index("ZY101")
+            mine = [s for s in site.watch.port.past.shots() if s["ranger"] == "ZY101"]
+            assert (sum(dropped["good"][row]), sum(dropped["failed"][row])) == (len(mine), 0)
+            with pytest.raises(InputError, match="is not a series in memory"):
+                site.watch.series(["amplitude:ZY101"])
             with pytest.raises(InputError, match="no history"):
                 site.watch.residuals(1)
             with pytest.raises(InputError, match="not in memory"):
                 site.watch.epoch(99)
             ranger = site.watch.ranger("ZY101")
             assert (ranger["kind"], ranger["station"]["mirror"]) == ("ground", "ZP101")
-            json.dumps([epoch, shots, ranger], allow_nan=False)
+            json.dumps([epoch, shots, ranger, series, dropped], allow_nan=False)
 
     run(story)
 

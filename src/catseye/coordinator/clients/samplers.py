@@ -116,7 +116,7 @@ class EpochPoint:
     at: int
 
     def row(self) -> Row:
-        """Columns of POINTS."""
+        """Values of the sampler POINTS."""
         epoch, k = self.points, self.at
         values = (_number(v) for v in epoch.values[k].tolist())
         return epoch.stamp, epoch.number, plain(epoch.names[k]), *values, _number(epoch.used[k])

@@ -196,7 +196,7 @@ class Consoles:
                 del self._clients[ranger]
 
     def close(self) -> None:
-        """Close all."""
+        """Close all connections to rangers."""
         for client, _ in self._clients.values():
             client.close()
         self._clients.clear()

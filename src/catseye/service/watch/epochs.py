@@ -1,6 +1,7 @@
 """One epoch of a journal: points, beams, residuals, air, rejected shots, surface; two epochs compared."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from catseye.coordinator.journal.entries import EPOCH_RANGES
 from catseye.errors import InputError
 from catseye.reduction.epoch.reason import status_of
 from catseye.service.watch.entries import COVARIANCE, Object, epoch_summary, number, numbers, words
-from catseye.service.watch.history import History, answer_of
+from catseye.service.watch.history import History
 from catseye.service.watch.index import first_seq
 from catseye.service.watch.site_map import SiteMap
+from catseye.service.watch.solutions import answer_of
 
 MOST_STRAY = 300  # rejected shots outside the epoch's own span of numbers that are looked up singly
 RANGES_BEHIND = text("SELECT seq, name, text FROM documents WHERE run = :run AND seq > :seq ORDER BY seq LIMIT 4")
@@ -37,13 +39,19 @@ class EpochRecord:
 
     def __init__(self, history: History, count: int, *, run: int | None = None, at: float | None = None):
         self._history = history
-        self.run, self.seq, self.solution = history.solution(count, run=run, at=at)
+        self._key, self.solution = history.solutions.solution(count, run=run, at=at)
+        self.run, self.seq = self._key.run, self._key.seq
         self.number = count
 
     @property
     def answer(self) -> Mapping[str, Any]:
-        """Stored answer."""
+        """Stored answer of the solution."""
         return self.solution.answer
+
+    @cached_property
+    def covariance(self) -> NDArray[np.float64] | None:
+        """Covariance (3n, 3n) m^2 of its points, read when it is needed; None where none is stored."""
+        return self._history.solutions.covariance(self._key)
 
     def ranges(self) -> dict[str, list[Any]]:
         """Columns of the adjusted ranges, see `range_columns`; empty in journals that do not store them."""
@@ -79,11 +87,15 @@ class EpochRecord:
                         rows[stray] = row[1:]
         return rows
 
+    def places(self) -> tuple[list[str], NDArray[np.float64]]:
+        """Names and places (n, 3) m of its points."""
+        names = [str(name) for name in self.answer.get("names") or ()]
+        return names, np.array(self.answer.get("x") or np.empty((0, 3)), dtype=float).reshape(-1, 3)
+
     def points(self) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
         """Names, places (n, 3) m, and covariance (n, 6) m^2 of each point by itself."""
-        names = [str(name) for name in self.answer.get("names") or ()]
-        places = np.array(self.answer.get("x") or np.empty((0, 3)), dtype=float).reshape(-1, 3)
-        return names, places, triangles_of(self.solution.covariance, len(names))
+        names, places = self.places()
+        return names, places, triangles_of(self.covariance, len(names))
 
 
 def epoch_object(record: EpochRecord, site: SiteMap) -> Object:
@@ -123,7 +135,7 @@ def point_columns(
     counts: Sequence[int] | None,
     site: SiteMap,
 ) -> Object:
-    """Columns of points."""
+    """Columns of an epoch's points."""
     table, spread = jsoned(places), jsoned(covariance)
     return {
         "name": list(names),
@@ -149,7 +161,7 @@ def residuals_object(record: EpochRecord, site: SiteMap) -> Object:
     """
     shots, ranges = record.shots(), record.ranges()
     rejected = {int(n): reason for n, reason in (record.answer.get("rejected") or {}).items()}
-    names, places, _ = record.points()
+    names, places = record.places()
     at = dict(zip(names, places, strict=True))
     rows = []
     if ranges:
@@ -264,16 +276,17 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     from catseye.reduction.surface.prisms import EpochPlace, prisms_of_points
     from catseye.reduction.surface.shape import ShapeSettings
 
-    names, places, _ = record.points()
+    names, places = record.places()
     records = site.site
     rows = [k for k, n in enumerate(names) if n in records.targets and records.targets[n].shapes_dish]
-    if record.solution.covariance is None or not rows:
+    covariance = record.covariance
+    if covariance is None or not rows:
         raise InputError(f"epoch {record.number} has no prisms of the dish with covariance (expected some)")
     at = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
     posture = (record.answer["azimuth"] / DEGREE, record.answer["elevation"] / DEGREE)
     prisms = prisms_of_points(
         places[rows],
-        record.solution.covariance[np.ix_(at, at)],
+        covariance[np.ix_(at, at)],
         [names[k] for k in rows],
         records,
         EpochPlace("ground", *posture, None),

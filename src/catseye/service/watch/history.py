@@ -1,16 +1,13 @@
 """State, epochs and events of a site from its journal, at any time."""
 
-import json
-from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+import threading
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from sqlalchemy import Connection, text
 
 from catseye.coordinator.condition import NO_SHOT
-from catseye.coordinator.journal.entries import EpochSolution
 from catseye.coordinator.parts import TICKS_PER_SECOND
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY
@@ -22,31 +19,26 @@ from catseye.service.watch.entries import (
     WEATHER,
     Object,
     columns,
-    epoch_summary,
     mjd_of,
     numbers,
     words,
 )
-from catseye.service.watch.index import JournalIndex, Stretch, ends_of, first_seq, limits
+from catseye.service.watch.index import JournalIndex, first_seq, limits
 from catseye.service.watch.site_map import SiteMap
+from catseye.service.watch.solutions import Solutions, answer_of, spread
 
+MINUTE_TICKS = TICKS_PER_DAY // 1440  # 0.4 ticks short of a minute
 SEVERITIES = ("debug", "note", "warning", "alarm")
 MOST_ROWS = 20_000  # of any answer
-MOST_SUMMARIES = 20_000  # epochs remembered, 1 kB each
+MOST_UNSOLVED = 50  # solutions without an answer among the latest epochs
 LOOKED_BACK = 3000  # events searched for the mode at a time
 WORDS = {"good": "well", "doubtful": "impaired", "failed": "alarm"}  # site's word by the epoch's verdict
-SOLUTIONS = text(
-    "SELECT seq, ticks, answer FROM solutions WHERE run = :run AND seq >= :low AND seq < :high "
-    "ORDER BY seq DESC LIMIT :limit"
-)
-ONE_SOLUTION = text("SELECT ticks, answer FROM solutions WHERE run = :run AND seq = :seq")
-SEQS = text("SELECT seq FROM solutions WHERE run = :run AND seq >= :low AND seq < :high ORDER BY seq")
-PIECE = text(
-    "SELECT size, substr(covariance, 1 + 8 * (size * :row + :row), 8 * (2 * size + 3)) AS part FROM solutions "
-    "WHERE run = :run AND seq = :seq"
-)
-SOLUTION = text("SELECT ticks, answer, size, covariance FROM solutions WHERE run = :run AND seq = :seq")
 EVENTS = "SELECT ticks, severity, who, kind, text FROM happenings WHERE run = :run AND seq >= :low AND seq < :high "
+SHOT_COUNTS = text(
+    "SELECT ranger, (ticks - :since) / :width AS bin, "
+    "SUM(CASE WHEN status IN ('used', 'reference') THEN 1 ELSE 0 END), COUNT(*) FROM shots "
+    "WHERE run = :run AND seq >= :low AND seq < :high AND ticks >= :since AND ticks < :until GROUP BY ranger, bin"
+)
 DETAILS = text(
     "SELECT who, kind, details FROM happenings WHERE run = :run AND seq < :high ORDER BY seq DESC LIMIT :limit"
 )
@@ -64,6 +56,7 @@ LAST_WEATHER = text(
 )
 
 
+Counts = dict[tuple[str, int], tuple[int, int]]
 PointRow = tuple[float, Sequence[float], Sequence[Any], Sequence[Any], int]
 
 
@@ -75,14 +68,17 @@ class History:
 
     def __init__(self, place: str):
         self.index = JournalIndex(place)
-        self._summaries: OrderedDict[tuple[int, int], Object | None] = OrderedDict()
+        self._counting = threading.Lock()
+        self._minutes: Counts = {}
+        self._counted: dict[tuple[str, int], int] = {}  # seq up to which the shots of a file's run are counted
+        self.solutions = Solutions(self.index)
 
     def site(self) -> SiteFolder:
         """Records of the last run."""
         return self.index.site()
 
     def runs(self) -> list[Object]:
-        """Runs with their times."""
+        """Runs with their starts and ends."""
         return [
             {"run": run.run, "uuid": run.uuid, "started": mjd_of(run.started), "ended": mjd_of(run.ended)}
             for run in self.index.runs()
@@ -106,124 +102,58 @@ class History:
 
     def epochs(self, since: float | None, until: float | None, limit: int) -> Object:
         """Summaries of solved epochs, oldest first."""
-        return {"epochs": list(reversed(list(self.latest_epochs(since, until, require_limit(limit)))))}
+        return {"epochs": self.latest_epochs(since, until, require_limit(limit))[::-1]}
 
-    def latest_epochs(self, since: float | None, until: float | None, limit: int) -> Iterator[Object]:
+    def latest_epochs(self, since: float | None, until: float | None, limit: int) -> list[Object]:
         """Summaries of solved epochs, the latest first."""
-        low, high = limits(since, until)
-        count = 0
-        for stretch in self.index.stretches("solutions", since, until):
-            for seq, ticks, answer in self._solutions(stretch, limit + 50):
-                if not low <= ticks <= high:
-                    continue
-                summary = self._summary(stretch.run, seq, ticks, answer)
-                if summary is not None and count < limit:
-                    count += 1
-                    yield summary
-            if count >= limit:
-                return
+        keys = self.solutions.keys(since, until)[-limit - MOST_UNSOLVED :]
+        return self.solutions.summaries(keys)[::-1][:limit]
 
-    def _solutions(self, stretch: Stretch, limit: int) -> list[Sequence[Any]]:
-        span = {"run": stretch.run, "low": stretch.low, "high": stretch.high, "limit": limit}
-        with stretch.part.reading() as connection:
-            return list(connection.execute(SOLUTIONS, span))
+    def spread_epochs(self, since: float | None, until: float | None, most: int) -> list[Object]:
+        """Summaries of a span's epochs, oldest first; at even distances if there are more."""
+        return self.solutions.summaries(spread(self.solutions.keys(since, until), most))
 
-    def _summary(self, run: int, seq: int, ticks: int, answer: Any) -> Object | None:
-        """Summary of a solution, None where nothing was solved."""
-        key = run, seq
-        if key not in self._summaries:
-            solution = EpochSolution(ticks, answer_of(answer))
-            self._summaries[key] = (epoch_summary(solution) | {"run": run, "seq": seq}) if solution.answer else None
-            if len(self._summaries) > MOST_SUMMARIES:
-                self._summaries.popitem(last=False)
-        return self._summaries[key]
-
-    def spread_epochs(
-        self, since: float | None, until: float | None, most: int
-    ) -> Iterator[tuple[Object, Callable[[], Any]]]:
-        """Epochs of a span, oldest first: summary, and its answer when called; at even distances if there are more."""
-        low, high = limits(since, until)
-        for connection, run, seq in self._spread(since, until, most):
-            row = connection.execute(ONE_SOLUTION, {"run": run, "seq": seq}).first()
-            if row is None or not low <= row.ticks <= high:
-                continue
-            summary = self._summary(run, seq, row.ticks, row.answer)
-            if summary is not None:
-                yield summary, partial(answer_of, row.answer)
-
-    def _spread(self, since: float | None, until: float | None, most: int) -> Iterator[tuple[Connection, int, int]]:
-        """Connection, run and seq of solutions, oldest first; at even distances if there are more than `most`."""
-        seqs: list[tuple[Stretch, list[int]]] = []
-        for stretch in reversed(list(self.index.stretches("solutions", since, until))):
-            with stretch.part.reading() as connection:
-                span = {"run": stretch.run, "low": stretch.low, "high": stretch.high}
-                seqs.append((stretch, [int(row[0]) for row in connection.execute(SEQS, span)]))
-        step = max(1, -(-sum(len(each) for _, each in seqs) // most))
-        for stretch, each in seqs:
-            with stretch.part.reading() as connection:
-                for seq in each[::-1][::step][::-1]:
-                    yield connection, stretch.run, seq
+    def spread_answers(self, since: float | None, until: float | None, most: int) -> Iterator[tuple[float, Any]]:
+        """MJD and stored answer of a span's epochs, oldest first; at even distances if there are more."""
+        for key, answer in self.solutions.answers(spread(self.solutions.keys(since, until), most)):
+            yield (answer.get("ticks") or key.ticks) / TICKS_PER_DAY, answer
 
     def point_rows(self, name: str, since: float | None, until: float | None, most: int) -> Iterator[PointRow]:
         """MJD, place, u and covariance of a point at each epoch that has it, oldest first, and the epoch's number."""
-        (low, high) = limits(since, until)
-        for connection, run, seq in self._spread(since, until, most):
-            row = connection.execute(ONE_SOLUTION, {"run": run, "seq": seq}).first()
-            if row is None or not low <= row.ticks <= high:
-                continue
-            stored = answer_of(row.answer)
-            names = stored.get("names") or ()
-            if name not in names:
-                continue
-            at = names.index(name)
-            triangle = _triangle(connection.execute(PIECE, {"run": run, "seq": seq, "row": 3 * at}).first())
+        rows = []
+        for key, answer in self.solutions.answers(spread(self.solutions.keys(since, until), most)):
+            names = answer.get("names") or ()
+            if name in names:
+                at = names.index(name)
+                rows.append((key, at, (answer.get("ticks") or key.ticks) / TICKS_PER_DAY, answer["x"][at], answer))
+        triangles = self.solutions.triangles([(key, at) for key, at, *_ in rows])
+        for (_, _, mjd, place, answer), triangle in zip(rows, triangles, strict=True):
             u = [None if triangle[k] is None else float(np.sqrt(max(triangle[k], 0.0))) for k in (0, 3, 5)]
-            mjd = (stored.get("ticks") or row.ticks) / TICKS_PER_DAY
-            yield mjd, stored["x"][at], u, triangle, stored["number"]
+            yield mjd, place, u, triangle, answer["number"]
 
-    def solution(
-        self, number: int, *, run: int | None = None, at: float | None = None
-    ) -> tuple[int, int, EpochSolution]:
-        """Run, seq and solution of an epoch.
+    # Counts ----------------------------------------------------------------------------------------------------------
 
-        Raises InputError for an unknown epoch.
-        """
-        which = self.index.run(run, at).run
-        for part in self.index.parts(which):
-            with part.reading() as connection:
-                seq = self._seq_of_epoch(connection, which, number)
-                row = None if seq is None else connection.execute(SOLUTION, {"run": which, "seq": seq}).first()
-            if row is not None:
-                matrix = None
-                if row.covariance is not None and len(row.covariance) == 8 * row.size**2:
-                    matrix = np.frombuffer(row.covariance, dtype="<f8").reshape(row.size, row.size)
-                return which, int(seq or 0), EpochSolution(row.ticks, answer_of(row.answer), matrix)
-        raise InputError(f"epoch {number} is not in run {which} of the journal (expected one of its epochs)")
+    def counts(self, low: int, high: int, width: int) -> Counts:
+        """Good shots and all, by ranger and beginning of a bin, between two ticks."""
+        counts: Counts = {}
+        for stretch in self.index.stretches("shots", low / TICKS_PER_DAY, high / TICKS_PER_DAY):
+            span: Object = {"run": stretch.run, "low": stretch.low, "high": stretch.high}
+            with stretch.part.reading() as connection:
+                _add(counts, connection, span | {"since": low, "until": high, "width": width})
+        return counts
 
-    def _seq_of_epoch(self, connection: Any, run: int, number: int) -> int | None:
-        """Seq of the solution with a number; those without an answer have none."""
-        query = text("SELECT seq, ticks, answer FROM solutions WHERE run = :run AND seq >= :seq ORDER BY seq LIMIT 1")
-        ends = ends_of(connection, "solutions", run)
-        if ends is None:
-            return None
-        low, high = ends[0], ends[1] + 1
-        while low < high:
-            middle, row = (low + high) // 2, None
-            start = middle
-            summary = None
-            while summary is None:  # skip those without an answer
-                row = connection.execute(query, {"run": run, "seq": start}).first()
-                if row is None:
-                    break
-                summary = self._summary(run, row.seq, row.ticks, row.answer)
-                start = row.seq + 1
-            if summary is None or row is None or summary["number"] > number:
-                high = middle
-            elif summary["number"] == number:
-                return int(row.seq)
-            else:
-                low = int(row.seq) + 1
-        return None
+    def minutes(self) -> Counts:
+        """Good shots and all of the whole journal, by ranger and minute; each shot is counted once and remembered."""
+        with self._counting:
+            for stretch in self.index.stretches("shots", None, None):
+                place = str(stretch.part.place), stretch.run
+                start = max(stretch.low, self._counted.get(place, 0))
+                if start < stretch.high:
+                    span: Object = {"run": stretch.run, "low": start, "high": stretch.high}
+                    with stretch.part.reading() as connection:
+                        _add(self._minutes, connection, span | {"since": 0, "until": 2**62, "width": MINUTE_TICKS})
+                    self._counted[place] = stretch.high
+            return dict(self._minutes)
 
     # Events ----------------------------------------------------------------------------------------------------------
 
@@ -345,13 +275,13 @@ class History:
         return mode, None if holder in (None, "nobody") else str(holder)
 
 
-def _triangle(piece: Any) -> list[Any]:
-    """Covariance of one point from its rows of a matrix: six numbers, None where there is none."""
-    if piece is not None and piece.size and piece.part is not None:
-        cells = np.frombuffer(bytes(piece.part), dtype="<f8")
-        if len(cells) == 2 * piece.size + 3:
-            return [float(cells[i * piece.size + j]) for i in range(3) for j in range(i, 3)]
-    return [None] * 6
+def _add(counts: Counts, connection: Connection, asked: Object) -> None:
+    """Add a stretch's shots to counts by ranger and bin."""
+    width = asked["width"]
+    for ranger, place, fine, count in connection.execute(SHOT_COUNTS, asked):
+        key = words(ranger), asked["since"] + int(place) * width
+        before = counts.get(key, (0, 0))
+        counts[key] = before[0] + int(fine), before[1] + int(count)
 
 
 def _ranger(name: str, shot: Object | None, at: float) -> Object:
@@ -371,15 +301,6 @@ def shot_object(row: Sequence[Any]) -> Object:
     """Shot of a row in the order of `LAST_SHOT`."""
     count, ticks, ranger, target, status, *values = row
     return dict(zip(SHOT, (count, mjd_of(ticks), *map(words, (ranger, target, status)), *numbers(values)), strict=True))
-
-
-def answer_of(cell: Any) -> Any:
-    """JSON object of a cell; empty where it is damaged."""
-    try:
-        answer = json.loads(words(cell))
-    except (ValueError, RecursionError):
-        return {}
-    return answer if isinstance(answer, dict) else {}
 
 
 def least_severities(severity: str | None) -> tuple[str, ...]:

@@ -74,7 +74,7 @@ class JournalIndex:
         return before[-1] if before else runs[0]
 
     def site(self, which: int | None = None) -> SiteFolder:
-        """Records of a run."""
+        """Records of a run, read once."""
         number = self.run(which).run
         if number not in self._sites:
             self._sites[number] = self.reader.site(number)
@@ -113,7 +113,7 @@ class JournalIndex:
 
 
 def limits(since: float | None, until: float | None) -> tuple[int, int]:
-    """Ticks of a span of MJD."""
+    """First and last ticks of a span of MJD."""
     low = BEGINNING if since is None else round(since * TICKS_PER_DAY)
     return low, END if until is None else round(until * TICKS_PER_DAY)
 

@@ -14,7 +14,7 @@ from catseye.service.watch.site_map import SiteMap
 
 LAST_SHOTS, LAST_COMMANDS = 50, 100
 MOST_SEARCHED = 200_000  # events of the journal through which shots on a target, or commands, are searched
-MOST_EPOCHS = 500
+MOST_EPOCHS = 150  # of more, some at even distances
 COMMANDS = text(
     "SELECT ticks, line, reply, ok FROM commands WHERE run = :run AND seq >= :low AND seq < :high "
     "AND ranger = :ranger AND line NOT LIKE 'VER%' ORDER BY seq DESC LIMIT :limit"
@@ -86,7 +86,7 @@ def ranger_object(history: History | None, site: SiteMap, name: str, state: Obje
         "kind": place["kind"],
         "station": station,
         "zero": zero,
-        "servo": None,  # no journal holds a mirror's following error; its console does: SRV
+        "servo": None,  # no journal holds the axes' following errors
         "certificates": certificates,
         "commands": commands,
     }
@@ -97,7 +97,7 @@ def last_zero(history: History, ranger: str, at: float) -> Object | None:
     last = next(iter(history.latest_epochs(None, at, 1)), None)
     if last is None:
         return None
-    zeros = history.solution(last["number"], run=last["run"])[2].answer.get("zeros") or {}
+    zeros = history.solutions.solution(last["number"], run=last["run"])[1].answer.get("zeros") or {}
     value = zeros.get(ranger)
     return None if not value else {"epoch": last["number"], "value": number(value[0]), "u": number(value[1])}
 

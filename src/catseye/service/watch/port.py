@@ -391,7 +391,7 @@ _READERS: dict[str, Callable[[float | None, tuple[str, ...]], Object]] = {
 
 
 def _problem(v: tuple[str, ...]) -> Object:
-    """A row of ALARMS."""
+    """Problem of a row of ALARMS."""
     instants = [None if text == "none" else parse_stamp(text) / TICKS_PER_DAY for text in (v[2], v[4], v[6])]
     return {
         "id": v[0],

@@ -58,7 +58,7 @@ class Words:
         return k
 
     def word(self, k: int) -> str:
-        """Word of a number."""
+        """Word of a number, "?" beyond the bound."""
         return self._words[k] if k >= 0 else "?"
 
 
@@ -75,7 +75,7 @@ class RecentPast:
         self.readings: deque[Object] = deque(maxlen=MOST_READINGS)
 
     def shot(self, shot: Object, ticks: int) -> None:
-        """Add a shot."""
+        """Add a shot; the oldest makes place."""
         names = (self._words.number(shot[key]) for key in ("ranger", "target", "status"))
         values = (np.nan if shot[key] is None else shot[key] for key in ("range", "u_range", "misfit"))
         self._shots.add(shot["number"] or 0, ticks, *names, *values)

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +11,15 @@ from sqlalchemy import text
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.service.watch.entries import Object, number, numbers, words
-from catseye.service.watch.history import History
+from catseye.service.watch.history import MINUTE_TICKS, History
 from catseye.service.watch.index import limits
 from catseye.service.watch.site_map import SiteMap
 
 MOST_BINS = 20_000
 MOST_NAMES = 64  # of one request
-MOST_EPOCHS = 1000  # read for one series: more are taken at even distances
+MOST_EPOCHS, MOST_ANSWERS = 400, 150  # summaries, and whole answers, of one series: of more, some at even distances
 GAP_S = 60.0  # s without a value over which a line is broken
-Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]  # MJD, value, u
+Column = NDArray[np.float64]
 SHOT_VALUES = {
     "range": ("range_m", "u_range_m", "range", "m"),
     "correction": ("misfit_m", "u_range_m", "range less prediction", "m"),
@@ -35,7 +35,16 @@ EPOCH_VALUES = {
     "refractivity": ("refractivity_ppm", "mean refractivity", "ppm"),
     "variance_factor": ("variance_factor", "variance factor", ""),
 }
-GOOD = ("used", "reference")
+
+
+class Columns(NamedTuple):
+    """Series: MJD, value, u; of bins also least and largest."""
+
+    mjd: Column
+    value: Column
+    u: Column | None
+    low: Column | None = None
+    high: Column | None = None
 
 
 def series_object(
@@ -45,49 +54,43 @@ def series_object(
 
     Raises InputError for an unknown name or a bound outside 2 to 20 000.
     """
+    require_series(names, most)
+    rows = []
+    for name in names:
+        label, unit, columns = _columns(history, name, since, until, most)
+        rows.append({"name": name, "label": label, "unit": unit} | binned(columns, most))
+    return {"names": rows, "gaps": GAP_S}
+
+
+def require_series(names: Sequence[str], most: int) -> None:
+    """Raise InputError for too many names, or a bound outside 2 to 20 000."""
     if not 2 <= most <= MOST_BINS:
         raise InputError(f"most = {most} (expected 2 to {MOST_BINS})")
     if not 1 <= len(names) <= MOST_NAMES:
         raise InputError(f"{len(names)} names (expected 1 to {MOST_NAMES})")
-    rows = []
-    for name in names:
-        label, unit, columns = _columns(history, name, since, until, most)
-        rows.append({"name": name, "label": label, "unit": unit} | binned(*columns, most))
-    return {"names": rows, "gaps": GAP_S}
 
 
-def binned(mjd: NDArray[np.float64], value: NDArray[np.float64], u: NDArray[np.float64] | None, most: int) -> Object:
+def binned(columns: "Columns", most: int) -> Object:
     """Values in order of time; more than `most` as bins of equal time with mean, least and largest."""
-    finite = np.isfinite(value)
-    mjd, value = mjd[finite], value[finite]
-    u = None if u is None else u[finite]
-    order = np.argsort(mjd, kind="stable")
-    mjd, value = mjd[order], value[order]
-    u = None if u is None else u[order]
-    if len(mjd) <= most:
-        spread = None if u is None else numbers(u.tolist())
-        return {"mjd": mjd.tolist(), "value": value.tolist(), "u": spread, "low": None, "high": None}
-    width = (mjd[-1] - mjd[0]) / most
-    bins = np.minimum(((mjd - mjd[0]) / width).astype(int), most - 1) if width > 0.0 else np.zeros(len(mjd), dtype=int)
-    first = np.flatnonzero(np.diff(bins, prepend=-1))
-    count = np.diff([*first, len(bins)])
-
-    def mean(column: NDArray[np.float64]) -> list[float | None]:
-        return numbers((np.add.reduceat(column, first) / count).tolist())
-
-    centre = mjd[0] + mean_of(mjd - mjd[0], first, count)
-    return {
-        "mjd": centre.tolist(),
-        "value": mean(value),
-        "u": None if u is None else mean(u),
-        "low": np.minimum.reduceat(value, first).tolist(),
-        "high": np.maximum.reduceat(value, first).tolist(),
-    }
+    finite = np.isfinite(columns.value)
+    order = np.flatnonzero(finite)[np.argsort(columns.mjd[finite], kind="stable")]
+    mjd, value, u, low, high = (None if column is None else column[order] for column in columns)
+    assert mjd is not None
+    assert value is not None
+    if len(mjd) > most and low is None:
+        width = (mjd[-1] - mjd[0]) / most
+        bins = (mjd - mjd[0]) / width if width > 0.0 else np.zeros(len(mjd))
+        first = np.flatnonzero(np.diff(np.minimum(bins.astype(int), most - 1), prepend=-1))
+        low, high = np.minimum.reduceat(value, first), np.maximum.reduceat(value, first)
+        mjd, value = mjd[0] + _means(mjd - mjd[0], first), _means(value, first)
+        u = None if u is None else _means(u, first)
+    cells = {"mjd": mjd, "value": value, "u": u, "low": low, "high": high}
+    return {key: None if column is None else numbers(column.tolist()) for key, column in cells.items()}
 
 
-def mean_of(column: NDArray[np.float64], first: NDArray[Any], count: NDArray[Any]) -> NDArray[np.float64]:
-    """Mean of each stretch of a column."""
-    return np.asarray(np.add.reduceat(column, first) / count)
+def _means(column: NDArray[np.float64], first: NDArray[Any]) -> NDArray[np.float64]:
+    """Mean of each stretch of a column; stretches begin at `first`."""
+    return np.asarray(np.add.reduceat(column, first) / np.diff([*first, len(column)]))
 
 
 def _columns(
@@ -100,53 +103,90 @@ def _columns(
         if kind == "amplitude" or target:
             column, u, label, unit = SHOT_VALUES[kind]
             line = f"{ranger} {target}".strip()
-            return f"{label} {line}", unit, _of_shots(history, (column, u), ranger, target, since, until)
+            return f"{label} {line}", unit, _of_shots(history, (column, u), (ranger, target), since, until, most)
     if kind in STATION_VALUES and of:
         column, label, unit = STATION_VALUES[kind]
-        return f"{label} {of}", unit, _of_table(history, "weather", column, since, until, {"station": of})
+        return f"{label} {of}", unit, _of_table(history, "weather", column, since, until, {"station": of}, most)
     if name in POSTURE_VALUES:
         column, label = POSTURE_VALUES[name]
         return label, "rad", _of_table(history, "postures", column, since, until, {}, most)
     if name in EPOCH_VALUES:
         key, label, unit = EPOCH_VALUES[name]
         rows = history.spread_epochs(since, until, min(most, MOST_EPOCHS))
-        return label, unit, _columns_of((row["mjd"], row[key], None) for row, _ in rows)
+        return label, unit, columns_of((row["mjd"], row[key], None) for row in rows)
     if kind == "zero" and of:
-        rows = history.spread_epochs(since, until, min(most, MOST_EPOCHS))
-        zeros = ((row["mjd"], (answer().get("zeros") or {}).get(of)) for row, answer in rows)
-        return f"zero {of}", "m", _columns_of((mjd, *v[:2]) for mjd, v in zeros if v)
+        answers = history.spread_answers(since, until, min(most, MOST_ANSWERS))
+        zeros = ((mjd, (answer.get("zeros") or {}).get(of)) for mjd, answer in answers)
+        return f"zero {of}", "m", columns_of((mjd, *v[:2]) for mjd, v in zeros if v)
     point = re.fullmatch(r"point:(.+):([xyz])", name)
     if point:
-        axis, count = "xyz".index(point[2]), min(most, MOST_EPOCHS)
+        axis, count = "xyz".index(point[2]), min(most, MOST_ANSWERS)
         places = history.point_rows(point[1], since, until, count)
-        return f"{point[1]} {point[2]}", "m", _columns_of((row[0], row[1][axis], row[2][axis]) for row in places)
+        return f"{point[1]} {point[2]}", "m", columns_of((row[0], row[1][axis], row[2][axis]) for row in places)
     raise InputError(f"{name[:60]!r} is not a series (expected a name of series/names)")
 
 
-def _columns_of(rows: Iterable[Sequence[Any]]) -> Columns:
-    """Columns of rows of MJD, value, u; None becomes NaN."""
-    table = np.array([[np.nan if v is None else v for v in row] for row in rows], dtype=float).reshape(-1, 3)
-    return table[:, 0], table[:, 1], None if np.isnan(table[:, 2]).all() else table[:, 2]
+def columns_of(rows: Iterable[Sequence[Any]]) -> Columns:
+    """Columns of rows of MJD, value, u, and of bins least and largest; None becomes NaN."""
+    table = np.array([[np.nan if v is None else v for v in row] for row in rows], dtype=float)
+    table = table.reshape(-1, table.shape[1] if table.ndim == 2 else 3)
+    u = None if np.isnan(table[:, 2]).all() else table[:, 2]
+    return Columns(table[:, 0], table[:, 1], u, *((table[:, 3], table[:, 4]) if table.shape[1] == 5 else (None, None)))
 
 
 def _of_shots(
-    history: History, values: tuple[str, str | None], ranger: str, target: str, since: float | None, until: float | None
+    history: History,
+    values: tuple[str, str | None],
+    line: tuple[str, str],
+    since: float | None,
+    until: float | None,
+    most: int,
 ) -> Columns:
-    """A value of the good shots of a line, by the index of (run, ranger, ticks)."""
-    column, u = values
-    low, high = limits(since, until)
-    condition = " AND target = :target" if target else " AND target <> 'ZRG'"
-    query = text(
-        f"SELECT ticks, {column}, {u or 'NULL'} FROM shots WHERE run = :run AND ranger = :ranger AND ticks >= :since "
-        f"AND ticks <= :until{condition} AND status IN ('used', 'reference') ORDER BY ticks"
+    """A value of the good shots of a line, by the index of (run, ranger, ticks); in bins by the database if many."""
+    (column, u), (ranger, target), (low, high) = values, line, limits(since, until)
+    where = (
+        "FROM shots WHERE run = :run AND ranger = :ranger AND ticks >= :since AND ticks <= :until"
+        + (" AND target = :target" if target else " AND target <> 'ZRG'")
+        + f" AND status IN ('used', 'reference') AND {column} IS NOT NULL"
     )
+    asked: Object = {"ranger": ranger, "since": low, "until": high} | ({"target": target} if target else {})
+    places = [
+        (run.run, part) for run in history.index.runs_between(since, until) for part in history.index.parts(run.run)
+    ]
+    ends = [_extent(part, where, asked | {"run": run}) for run, part in places]
+    count, first, last = _joined(ends)
     rows: list[Any] = []
-    for run in history.index.runs_between(since, until):
-        for part in history.index.parts(run.run):
-            asked = {"run": run.run, "ranger": ranger, "since": low, "until": high}
-            with part.reading() as connection:
-                rows += connection.execute(query, asked | ({"target": target} if target else {}))
-    return _columns_of((ticks / TICKS_PER_DAY, number(value), number(spread)) for ticks, value, spread in rows)
+    width = (last - first) // most + 1
+    for run, part in places:
+        with part.reading() as connection:
+            if count <= most:
+                query = f"SELECT ticks, {column}, {u or 'NULL'} {where} ORDER BY ticks"
+                rows += connection.execute(text(query), asked | {"run": run})
+                continue
+            u_mean = f"AVG({u or 'CAST(NULL AS FLOAT)'})"
+            bins = f"SELECT AVG(ticks), AVG({column}), {u_mean}, MIN({column}), MAX({column})"
+            query = f"{bins} {where} GROUP BY (ticks - :first) / :width ORDER BY 1"
+            rows += connection.execute(text(query), asked | {"run": run, "first": first, "width": width})
+    return columns_of((float(ticks) / TICKS_PER_DAY, *map(_real, values)) for ticks, *values in rows)
+
+
+def _extent(part: Any, where: str, asked: Object) -> tuple[int, int | None, int | None]:
+    """Number of rows and their first and last ticks."""
+    with part.reading() as connection:
+        count, first, last = connection.execute(text(f"SELECT COUNT(*), MIN(ticks), MAX(ticks) {where}"), asked).one()
+    return int(count), first, last
+
+
+def _joined(ends: Sequence[tuple[int, int | None, int | None]]) -> tuple[int, int, int]:
+    """Number of rows of all, first and last ticks."""
+    firsts = [first for _, first, _ in ends if first is not None]
+    lasts = [last for _, _, last in ends if last is not None]
+    return sum(count for count, _, _ in ends), min(firsts, default=0), max(lasts, default=0)
+
+
+def _real(value: Any) -> float | None:
+    """A number of the database, which may be a decimal."""
+    return None if value is None or isinstance(value, str | bytes) else number(float(value))
 
 
 def _of_table(
@@ -156,42 +196,32 @@ def _of_table(
     since: float | None,
     until: float | None,
     where: dict[str, str],
-    most: int = MOST_BINS,
+    most: int,
 ) -> Columns:
-    """A column of a table over a span; of postures, thousands a night, only as many as are shown."""
+    """A column of a table over a span, at even distances if it has more rows than are wanted."""
     low, high = limits(since, until)
     condition = "".join(f" AND {key} = :{key}" for key in where)
-    found: list[Any] = []
     stretches = list(history.index.stretches(table, since, until))
-    total = sum(stretch.high - stretch.low for stretch in stretches)
-    for stretch in reversed(stretches):
-        span = {"run": stretch.run, "since": low, "until": high}
-        step = max(1, total // (4 * most)) if not where else 1
-        cells = _cells if step == 1 else _sampled
-        with stretch.part.reading() as connection:
-            query = f"SELECT seq, ticks, {column} FROM {table} WHERE run = :run AND ticks >= :since AND ticks <= :until"
-            found += cells(connection, f"{query}{condition}", span | where, stretch.low, stretch.high, step)
-    return _columns_of((ticks / TICKS_PER_DAY, number(value), None) for _, ticks, value in found)
-
-
-def _cells(connection: Any, query: str, values: Object, low: int, high: int, _: int) -> list[Any]:
-    """All rows of a stretch."""
-    return list(
-        connection.execute(
-            text(f"{query} AND seq >= :low AND seq < :high ORDER BY seq"), values | {"low": low, "high": high}
-        )
+    step = max(1, sum(stretch.high - stretch.low for stretch in stretches) // most)
+    every = text(
+        f"SELECT ticks, {column} FROM {table} WHERE run = :run AND seq >= :low AND seq < :high AND ticks >= :since "
+        f"AND ticks <= :until{condition} ORDER BY seq"
     )
-
-
-def _sampled(connection: Any, query: str, values: Object, low: int, high: int, step: int) -> list[Any]:
-    """Rows of a stretch at distances of `step` events."""
-    one = text(f"{query} AND seq >= :low ORDER BY seq LIMIT 1")
+    some = text(
+        "WITH RECURSIVE steps(low) AS (SELECT CAST(:low AS BIGINT) UNION ALL SELECT low + :step FROM steps WHERE "
+        f"low + :step < :high) SELECT t.ticks, t.{column} FROM steps JOIN {table} AS t ON t.run = :run AND t.seq = "
+        f"(SELECT seq FROM {table} WHERE run = :run AND seq >= steps.low AND seq < steps.low + :step ORDER BY seq "
+        "LIMIT 1) WHERE t.ticks >= :since AND t.ticks <= :until ORDER BY t.seq"
+    )
     rows: list[Any] = []
-    for seq in range(low, high, step):
-        row = connection.execute(one, values | {"low": seq}).first()
-        if row is not None and (not rows or row[0] > rows[-1][0]):
-            rows.append(row)
-    return rows
+    for stretch in reversed(stretches):
+        asked: Object = {"run": stretch.run, "low": stretch.low, "high": stretch.high, "since": low, "until": high}
+        with stretch.part.reading() as connection:
+            if where or step == 1:
+                rows += connection.execute(every, asked | where)
+            else:
+                rows += connection.execute(some, asked | {"step": step})
+    return columns_of((ticks / TICKS_PER_DAY, number(value), None) for ticks, value in rows)
 
 
 def series_names(history: History, site: SiteMap) -> Object:
@@ -220,7 +250,7 @@ def series_names(history: History, site: SiteMap) -> Object:
     rows += [{"name": name, "label": label, "unit": unit} for name, (_, label, unit) in EPOCH_VALUES.items()]
     last = next(iter(history.latest_epochs(None, None, 1)), None)
     if last is not None:
-        names = history.solution(last["number"], run=last["run"])[2].answer.get("names") or ()
+        names = history.solutions.solution(last["number"], run=last["run"])[1].answer.get("names") or ()
         rows += [{"name": f"point:{n}:{a}", "label": f"{n} {a}", "unit": "m"} for n in names for a in "xyz"]
     return {"names": rows}
 
@@ -235,25 +265,20 @@ def dropped_object(history: History, site: SiteMap, since: float | None, until: 
         raise InputError(f"since = {since}, until = {until} (expected an earlier and a later MJD)")
     low, high = limits(since, until)
     width = max(1, -(-(high - low) // bins))
-    query = text(
-        "SELECT ranger, (ticks - :since) / :width AS bin, SUM(CASE WHEN status IN ('used', 'reference') THEN 1 ELSE 0 "
-        "END), COUNT(*) FROM shots WHERE run = :run AND seq >= :low AND seq < :high AND ticks >= :since AND ticks "
-        "< :until GROUP BY ranger, bin"
-    )
+    if width >= 4 * MINUTE_TICKS:  # whole minutes, which are counted once and remembered
+        width = -(-width // MINUTE_TICKS) * MINUTE_TICKS
+        low = low // MINUTE_TICKS * MINUTE_TICKS
     rangers = list(site.site.rangers)
-    good, every = np.zeros((len(rangers), bins), dtype=int), np.zeros((len(rangers), bins), dtype=int)
-    for stretch in history.index.stretches("shots", since, until):
-        asked = {"run": stretch.run, "low": stretch.low, "high": stretch.high, "since": low, "until": high}
-        with stretch.part.reading() as connection:
-            for ranger, place, fine, count in connection.execute(query, asked | {"width": width}):
-                if words(ranger) in rangers and 0 <= int(place) < bins:
-                    row = rangers.index(words(ranger))
-                    good[row, int(place)] += int(fine)
-                    every[row, int(place)] += int(count)
-    starts = [(low + k * width) / TICKS_PER_DAY for k in range(bins)]
+    good, every = (np.zeros((len(rangers), bins), dtype=int) for _ in range(2))
+    counted = history.minutes() if width >= 4 * MINUTE_TICKS else history.counts(low, high, width)
+    for (ranger, ticks), (fine, count) in counted.items():
+        place = (ticks - low) // width
+        if ranger in rangers and 0 <= place < bins:
+            good[rangers.index(ranger), place] += fine
+            every[rangers.index(ranger), place] += count
     return {
         "rangers": rangers,
-        "bins": starts,
+        "bins": [(low + k * width) / TICKS_PER_DAY for k in range(bins)],
         "width": width / TICKS_PER_DAY,
         "good": good.tolist(),
         "failed": (every - good).tolist(),

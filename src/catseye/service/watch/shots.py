@@ -119,7 +119,7 @@ class ShotRecord:
 
     def epoch(self) -> EpochRecord | None:
         """Epoch that took the shot; None if none did."""
-        for summary in reversed(list(self._history.latest_epochs(*self._about(), 12))):
+        for summary in reversed(self._history.latest_epochs(*self._about(), 12)):
             if summary["run"] != self.run:
                 continue
             record = EpochRecord(self._history, summary["number"], run=self.run)

@@ -31,7 +31,7 @@ class SiteMap:
 
     @property
     def name(self) -> str:
-        """Name of the site."""
+        """Name of the site by its records."""
         return self.site.site.campaign.name
 
     @cached_property
@@ -113,7 +113,7 @@ class SiteMap:
         return np.asarray(np.mean([np.array(r.nominal_scan_point_mm) * MILLIMETRE for r in rangers], axis=0))
 
     def to_object(self) -> dict[str, Any]:
-        """JSON object of the map."""
+        """JSON object of the whole map."""
         location = self.site.site.site
         azimuth, elevation = self.posture
         return {

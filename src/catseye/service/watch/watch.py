@@ -15,6 +15,8 @@ from catseye.service.watch.commands import LOOK, CommandDesk, Consoles
 from catseye.service.watch.entries import EVENT, SHOT, Object, rows_to_columns
 from catseye.service.watch.history import History, least_severities, require_limit
 from catseye.service.watch.port import SitePort
+from catseye.service.watch.recent_series import recent_dropped, recent_names, recent_series
+from catseye.service.watch.series import dropped_object, series_names, series_object
 from catseye.service.watch.site_map import SiteMap
 
 if TYPE_CHECKING:
@@ -114,7 +116,7 @@ class SiteWatch:
         return self._place is not None
 
     def now(self) -> float:
-        """Present MJD."""
+        """Present time of the watch, MJD."""
         return ticks_now(self.clock) / TICKS_PER_DAY
 
     def _journal(self) -> History:
@@ -138,7 +140,7 @@ class SiteWatch:
         return await self._commands().command(name, parameters, who)
 
     async def acknowledge(self, alarm: str, who: str) -> Object:
-        """Acknowledge an alarm."""
+        """Acknowledge an alarm, as a person."""
         return await self._commands().alarm("ACK", alarm, who)
 
     async def shelve(self, alarm: str, who: str, minutes: float) -> Object:
@@ -227,20 +229,20 @@ class SiteWatch:
         self, names: Sequence[str], since: float | None = None, until: float | None = None, most: int = 2000
     ) -> Object:
         """Series by name, at most `most` values or bins each."""
-        from catseye.service.watch.series import series_object
-
+        if self._place is None:
+            return recent_series(self._past, names, since, until, most)
         return series_object(self._journal(), names, since, until, most)
 
     def series_names(self) -> Object:
         """Names of all series with labels and units."""
-        from catseye.service.watch.series import series_names
-
+        if self._place is None:
+            return recent_names(self._past)
         return series_names(self._journal(), self.map)
 
     def dropped(self, since: float | None = None, until: float | None = None, bins: int = 200) -> Object:
         """Good and failed shots of each ranger in bins of time."""
-        from catseye.service.watch.series import dropped_object
-
+        if self._place is None:
+            return recent_dropped(self._past, self.map, since, until, bins)
         return dropped_object(self._journal(), self.map, since, until, bins)
 
     def shots(
@@ -318,7 +320,7 @@ class SiteWatch:
         if self._place is not None:
             return self._journal().events(since, until, severity, limit)
         chosen = least_severities(severity)
-        rows = [event for event in self._past.events if event["severity"] in chosen]
+        rows = [event for event in list(self._past.events) if event["severity"] in chosen]
         return rows_to_columns(EVENT, _within(rows, since, until, limit))
 
     def _epoch(self, number: int, run: int | None, at: float | None) -> "EpochRecord":
@@ -347,11 +349,11 @@ class SiteWatch:
     def _live_epoch(self, number: int) -> Object:
         """The last epoch from the port, where no journal is watched."""
         points = None if self.port is None else self.port.points
-        summary = next((e for e in reversed(self._past.epochs) if e["number"] == number), None)
+        summary = next((e for e in reversed(list(self._past.epochs)) if e["number"] == number), None)
         if points is None or summary is None or points["number"] != number:
             raise InputError(f"epoch {number} is not in memory: only the last is, since no journal is watched")
         columns = points["points"]
-        before = [e["mjd"] for e in self._past.epochs if e["mjd"] < summary["mjd"]]
+        before = [e["mjd"] for e in list(self._past.epochs) if e["mjd"] < summary["mjd"]]
         shots = _within(list(self._past.shots()), max(before, default=None), summary["mjd"], MOST_BEAMS)
         lines = [shot for shot in shots if shot["status"] == "used"]
         nothing: Object = {key: {} for key in ("jitter_mm", "biases")} | {"doubts": [], "notes": [], "rejected": []}
