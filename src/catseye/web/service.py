@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SEND_BUFFER = 262_144  # bytes of a connection in the kernel: a client that takes nothing is seen after so many
 LONGEST_SETTINGS = 65_536  # bytes
+NICE = 5  # on a busy machine the site comes first
 
 
 def run(settings: "PageSettings") -> None:
@@ -31,6 +32,8 @@ def run(settings: "PageSettings") -> None:
 
     Raises InputError: a subject that cannot be read, a port that is taken.
     """
+    with suppress(OSError):
+        os.nice(NICE)
     with listening_socket(*settings.listen) as listener:
         subject = subject_of(settings)
         try:

@@ -18,7 +18,9 @@ def view(
         str,
         typer.Argument(metavar="RESULT|JOURNAL", help="Directory or report of a result, or a journal."),
     ],
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser, where there is one.")] = True,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="A browser window, where this machine has one.")
+    ] = True,
     page: PageOptions,
     quiet: Quiet = False,
 ) -> None:
