@@ -45,7 +45,8 @@ READ = [
         "files",
     ),
     *("heights", "inputs", "instrument", "interlocks", "keep_out", "later", "mirror", "monument", "network"),
-    *("observations", "poses", "positions", "readings", "record", "sheet", "site", "solids", "sources", "survey"),
+    *("observations", "page_certificate", "page_key", "page_token_file", "poses", "positions"),
+    *("readings", "record", "sheet", "site", "solids", "sources", "survey"),
     *("survey_left", "tilts", "train"),
 ]
 

@@ -264,7 +264,7 @@ def callbacks():
     }
 
 
-WITHOUT_CALL = {"demo", "serve", "zy", "ziy"}  # the first is `reduce` and `save`; servers end with their process
+WITHOUT_CALL = {"demo", "serve", "view", "zy", "ziy"}  # the first is `reduce`, `save`; servers end with their process
 ONE_CALL = sorted(set(callbacks()) - WITHOUT_CALL)
 
 

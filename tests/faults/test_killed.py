@@ -250,7 +250,7 @@ def test_terminated_coordinator_leaves_one_complete_file(tmp_path):
 
 @pytest.mark.slow
 def test_killed_site_leaves_no_twin(tmp_path):
-    words = ["serve", small_site(), "--twin", "--port-base", free_base(), "--port", "0", "--log-json"]
+    words = ["serve", small_site(), "--twin", "--no-page", "--port-base", free_base(), "--port", "0", "--log-json"]
     with started(*words, home=tmp_path) as process:
         while "rangers and the feed listen" not in (line := process.stderr.readline()):
             assert line

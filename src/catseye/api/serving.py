@@ -3,13 +3,15 @@
 They install handlers of SIGINT and SIGTERM, and are not exported from `catseye`.
 """
 
-import math
+import asyncio
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 from catseye.api.journal import mjd_argument
+from catseye.api.live.beside import site_page
+from catseye.api.live.limits import LAST_PORT, one_of, within
 from catseye.api.reading import place_of
 from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError, InputError
@@ -28,7 +30,6 @@ Place = str | os.PathLike[str] | None
 MOTION = "track 145.3 45"
 PORT_BASE = 24_100  # as in catseye.ranger.addresses
 LARGEST_SEED = 2**31
-LAST_PORT = 65_535
 MOST_OFFSET_S = 1e11  # s: 3000 years
 
 
@@ -184,15 +185,29 @@ def serve(
     addresses: Place = None,
     feed: str | None = None,
     motion_script: str | None = None,
+    page: bool = True,
+    page_host: str | None = None,
+    page_port: Annotated[Any, In("", whole=True)] = None,
+    page_certificate: Place = None,
+    page_key: Place = None,
+    page_token_file: Place = None,
+    page_names: Sequence[str] = (),
     log_json: bool = False,
     screen: bool = False,
     tell: "Tell | None" = None,
+    announce: "Tell" = lambda line: None,
     **orders: Unpack["OrderOptions"],
 ) -> "SiteEnd":
-    """Run a site until a signal: its coordinator and, where there is no hardware, a twin that is restarted.
+    """Run a site until a signal: coordinator, page, and, where there is no hardware, a twin; children are restarted.
 
     twin   True for simulated rangers, in a process of their own
     seed, motion, start_mjd, conditions, faults   of the twin, as for `zy`
+    page   False for no page; True for one in a process of its own, where the extra `web` is installed
+    page_host, page_port   where it listens; None for 127.0.0.1 and 5261, port 0 for any free one
+    page_certificate, page_key   PEM files of TLS, needed beyond this machine
+    page_token_file   file of the token of its commands; None for a new token
+    page_names     further names that the page is called by
+    announce       called once with a line on the page: its link with the token, or that there is none
     others as for `ziy`
 
     Raises InputError and ArgumentError as `ziy`.
@@ -213,13 +228,34 @@ def serve(
     if twin:
         world.twin(records)  # an impossible twin is refused here
 
-    async def children(log: "LiveLog") -> None:
+    beside = None
+    if page:
+        beside = site_page(
+            {"site": str(site), "journal": given.journal, "rangers": peers.rangers},
+            host=page_host,
+            port=page_port,
+            certificate=page_certificate,
+            key=page_key,
+            token_file=page_token_file,
+            names=page_names,
+            announce=announce,
+            at_once=screen,
+        )
+
+    async def keep_twin(log: "LiveLog") -> None:
         await LiveChild(
             "twin",
             twin_arguments(str(site), world, port_base),
             said=lambda line: log.tell("twin", "listens", f"{len(peers.rangers)} rangers and the feed listen"),
             warned=lambda line: log.tell("twin", "child", line, "warning"),
         ).keep(patient=True)
+
+    async def children(log: "LiveLog", own_port: "asyncio.Future[int]") -> None:
+        async with asyncio.TaskGroup() as tasks:
+            if twin:
+                tasks.create_task(keep_twin(log))
+            if beside is not None:
+                tasks.create_task(beside.keep(log, (given.host, await own_port)))
 
     return serve_coordinator(
         records,
@@ -228,7 +264,7 @@ def serve(
         offset=world.offset if twin else 0.0,
         seed=seed if twin else None,
         log_options=LogOptions(tell, log_json, screen),
-        beside=children if twin else None,
+        beside=children if twin or beside is not None else None,
     )
 
 
@@ -308,18 +344,6 @@ def mjd_start(start_mjd: float | str | None, usual: float | None = None, *, offs
     from catseye.geometry.sky.time_tag import PER_DAY
 
     return SystemClock(offset).now_ns() / PER_DAY
-
-
-def within(name: str, value: float | None, low: float, high: float, unit: str = "") -> None:
-    """Raise ArgumentError for a number out of its range."""
-    if value is not None and not (math.isfinite(value) and low <= value <= high):
-        raise ArgumentError(f"{name} = {value:g} is not {low:g} to {high:g}{unit}", name)
-
-
-def one_of(name: str, value: str, words: Sequence[str]) -> None:
-    """Raise ArgumentError for an unknown word."""
-    if value not in words:
-        raise ArgumentError(f"{name} = {value!r} is not one of {', '.join(words)}", name)
 
 
 def twin_options(seed: int, motion: str, conditions: str, faults: Sequence[str]) -> dict[str, Any]:

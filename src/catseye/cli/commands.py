@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ROOMS = (
     *("air.air", "air.sound", "air.refractometer", "air.acoustic", "networks", "explain", "calibrate", "certificate"),
     *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
-    *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.replay", "live.export", "live.journal"),
+    *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
@@ -31,7 +31,7 @@ SUBJECTS = {  # as `catseye --help` groups the commands
     "Laboratory": ("calibrate", "certificate", "triplet"),
     "Air": ("air", "sound", "refractometer", "acoustic"),
     "Light": ("point", "link", "beam", "glass", "safety"),
-    "A living site": ("simulate", "serve", "zy", "ziy", "replay", "export", "journal"),
+    "A living site": ("simulate", "serve", "view", "zy", "ziy", "replay", "export", "journal"),
     "Figures": ("plot",),
 }
 

@@ -61,12 +61,23 @@ def key_of(environment: Mapping[str, str] = os.environ) -> str | None:
     Raises InputError: a file that is unreadable or readable by others, a key too short, trivial, or not of printable
     ASCII without blanks and commas.
     """
-    key, where = environment.get(KEY), KEY
+    key = environment.get(KEY)
     if key is None and environment.get(KEY_FILE):
-        where = f"{KEY_FILE}={environment[KEY_FILE]}"
-        key = _key_in(Path(environment[KEY_FILE]), where)
-    if key is None:
-        return None
+        return key_in(Path(environment[KEY_FILE]), f"{KEY_FILE}={environment[KEY_FILE]}")
+    return None if key is None else _checked(key, KEY)
+
+
+def key_in(path: Path, where: str) -> str:
+    """Key in a file of one line that only its owner may read.
+
+    where   name of the file in messages
+
+    Raises InputError: a file that is unreadable or readable by others, and as `key_of`.
+    """
+    return _checked(_line_of(path, where), where)
+
+
+def _checked(key: str, where: str) -> str:
     if len(key) < SHORTEST or not all("!" <= c <= "~" and c not in ",;" for c in key):
         raise InputError(
             f"{where}: {len(key)} characters (expected {SHORTEST} or more, printable, no blank, comma or semicolon)"
@@ -77,7 +88,7 @@ def key_of(environment: Mapping[str, str] = os.environ) -> str | None:
     return key
 
 
-def _key_in(path: Path, where: str) -> str:
+def _line_of(path: Path, where: str) -> str:
     """The line of a key's file.
 
     Raises InputError if it is unreadable, or readable by others.

@@ -29,6 +29,7 @@ class LiveChild:
     said       called with each line of its standard output
     warned     called with each line of its standard error
     program    that takes the arguments
+    first_line called at each start for the first line on its standard input; None: it gets none
     """
 
     def __init__(
@@ -39,8 +40,9 @@ class LiveChild:
         said: LineHandler,
         warned: LineHandler,
         program: Sequence[str] = PROGRAM,
+        first_line: Callable[[], str] | None = None,
     ):
-        self._program = tuple(program)
+        self._program, self._first_line = tuple(program), first_line
         self.name, self._arguments, self._said, self._warned = name, tuple(arguments), said, warned
         self._process: asyncio.subprocess.Process | None = None
         self._readers: list[asyncio.Task[None]] = []
@@ -72,6 +74,8 @@ class LiveChild:
             asyncio.create_task(self._read(process.stdout, self._hear)),
             asyncio.create_task(self._read(process.stderr, self._warn)),
         ]
+        if self._first_line is not None and process.stdin is not None:
+            process.stdin.write(self._first_line().encode() + b"\n")  # buffered: a child that has ended is seen below
         exit_task, output_task = asyncio.create_task(process.wait()), asyncio.create_task(self._output_seen.wait())
         try:
             await asyncio.wait([exit_task, output_task], timeout=LONGEST_START, return_when=asyncio.FIRST_COMPLETED)

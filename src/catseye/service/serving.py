@@ -55,14 +55,14 @@ def serve_coordinator(
     offset: float = 0.0,
     seed: int | None = None,
     log_options: LogOptions = LogOptions(),
-    beside: Callable[[LiveLog], Coroutine[Any, Any, None]] | None = None,
+    beside: Callable[[LiveLog, asyncio.Future[int]], Coroutine[Any, Any, None]] | None = None,
 ) -> SiteEnd:
     """Run a coordinator with its log or screen until a signal.
 
     peers    rangers and feed
     offset   s, of its clock against this machine's
     seed     of a simulated site, for the journal
-    beside   coroutine function that runs beside it with the log: its children
+    beside   coroutine function that runs beside it with the log and the port of its clients: its children
 
     Raises CatseyeError where it cannot run; with a log in JSON, the log reports it.
     """
@@ -89,12 +89,15 @@ def serve_coordinator(
             running.ziy.listeners += [book.entry, view.entry]
             view.begin(book, running)
 
+        port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
         def started() -> None:
+            port.set_result(running.server.port)
             log.tell("coordinator", "listens", f"its clients connect to {orders.host} port {running.server.port}")
 
         parts = [asyncio.ensure_future(running.run(started)), asyncio.ensure_future(live())]
         if beside is not None:
-            parts.append(asyncio.ensure_future(beside(log)))
+            parts.append(asyncio.ensure_future(beside(log, port)))
         try:
             done, _ = await asyncio.wait(parts, return_when=asyncio.FIRST_COMPLETED)
             for part in done:

@@ -41,7 +41,7 @@ def test_a_site_that_is_not_there_is_named(catseye):
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
 def test_a_twin_that_dies_comes_back_and_the_end_is_clean(tmp_path, number, status):
-    words = ["serve", small_site(), "--twin", "--port-base", free_base(), "--port", "0", "--log-json"]
+    words = ["serve", small_site(), "--twin", "--no-page", "--port-base", free_base(), "--port", "0", "--log-json"]
     words += ["--start", "60635.125", "--journal", tmp_path / "site.db"]
     with started(*words, home=tmp_path) as process:
         read_until(process, "listens")
@@ -64,7 +64,7 @@ def test_a_twin_that_dies_comes_back_and_the_end_is_clean(tmp_path, number, stat
 @pytest.mark.slow
 def test_a_site_ends_within_five_seconds_beside_ten_busy_processes(tmp_path):
     """5.2 s, and by force, before its waits had shares; ten processes on two cores are a load of 10."""
-    words = ["serve", small_site(), "--twin", "--port-base", free_base(), "--port", "0", "--log-json"]
+    words = ["serve", small_site(), "--twin", "--no-page", "--port-base", free_base(), "--port", "0", "--log-json"]
     words += ["--start", "60635.125", "--journal", tmp_path / "site.db"]
     busy = []
     with started(*words, home=tmp_path) as process:

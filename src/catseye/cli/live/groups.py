@@ -26,6 +26,7 @@ from catseye.cli.live.options import (
     Seed,
     SolidsFile,
     Start,
+    within,
 )
 
 Loopback = Annotated[bool, typer.Option("--loopback", help="Rangers at 127.0.8.k, the feed at 127.0.0.1 port 5250.")]
@@ -37,13 +38,36 @@ MotionScriptText = Annotated[
     str | None,
     typer.Option("--motion-script", metavar='FILE|"fixed AZ EL"', help="Motion known beforehand; no feed."),
 ]
+PageHost = Annotated[
+    str | None, typer.Option("--page-host", help="Address that browsers connect to.  [default: 127.0.0.1]")
+]
+PagePort = Annotated[
+    int | None,
+    typer.Option(
+        "--page-port",
+        callback=within(0, 65_535, ""),
+        help="Port that browsers connect to; 0: any free one.  [default: 5261 beside a site, else 0]",
+    ),
+]
+PageCertificate = Annotated[
+    Path | None, typer.Option("--page-certificate", metavar="FILE.pem", help="Certificate of TLS, for other machines.")
+]
+PageKey = Annotated[Path | None, typer.Option("--page-key", metavar="FILE.pem", help="Key of that certificate.")]
+PageTokenFile = Annotated[
+    Path | None,
+    typer.Option("--page-token-file", metavar="FILE", help="File of the page's token.  [default: a new token]"),
+]
+PageNames = Annotated[
+    list[str] | None,
+    typer.Option("--page-name", metavar="NAME", help="Further name that browsers call the page by; may repeat."),
+]
 Host = Annotated[str | None, typer.Option("--host", help="Address of its own port, or unix:DIR.  [default: 127.0.0.1]")]
 
 
 def arguments(group: NamedTuple) -> dict[str, Any]:
     """Arguments of a call from a group of options; a list that was not given is empty."""
     named = group._asdict()
-    return named | {name: named[name] or () for name in ("faults", "drop") if name in named}
+    return named | {name: named[name] or () for name in ("faults", "drop", "page_names") if name in named}
 
 
 class TwinOptions(NamedTuple):
@@ -77,3 +101,14 @@ class CoordinatorOptions(NamedTuple):
     solids: SolidsFile = None
     host: Host = None
     port: Port = None
+
+
+class PageOptions(NamedTuple):
+    """The page of `catseye serve` and `catseye view`; each field is an option."""
+
+    page_host: PageHost = None
+    page_port: PagePort = None
+    page_certificate: PageCertificate = None
+    page_key: PageKey = None
+    page_token_file: PageTokenFile = None
+    page_names: PageNames = None

@@ -1,0 +1,44 @@
+"""The page of components is true: each pinned wheel and each npm package, with its version and its stated licence."""
+
+import re
+from importlib.metadata import PackageNotFoundError, version
+
+import pytest
+
+from contracts import components_scene as scene
+
+ROW = re.compile(r"^\| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
+REFUSED = re.compile(r"\bA?GPL(?!-compatible)")  # a wheel of users that would bind them
+
+
+def rows(text):
+    return [row for row in ROW.findall(text) if row[0] != "component"]
+
+
+def test_the_page_lists_every_pin():
+    listed = {(name, number) for name, number, _ in rows(scene.PAGE.read_text(encoding="utf-8"))}
+    assert set(scene.pins().values()) - listed == set()
+
+
+def test_the_page_is_what_the_packages_state():
+    for name, (_, number) in scene.pins().items():
+        try:
+            installed = version(name)
+        except PackageNotFoundError:
+            pytest.skip(f"{name} is not installed: the licences cannot be compared")
+        if installed != number:
+            pytest.skip(f"{name} {installed} is not the pinned {number}: the licences cannot be compared")
+    assert scene.page_text() == scene.PAGE.read_text(encoding="utf-8"), scene.__doc__
+
+
+def test_nothing_that_users_get_has_a_licence_that_binds_them():
+    text = scene.PAGE.read_text(encoding="utf-8")
+    users = "\n".join(part for part in text.split("\n## ") if not part.startswith("For developers"))
+    assert len(rows(users)) > 20
+    assert [row for row in rows(users) if REFUSED.search(row[2]) and "LGPL" not in row[2]] == []
+
+
+def test_what_is_built_in_is_named():
+    text = scene.PAGE.read_text(encoding="utf-8")
+    [built] = [part for part in text.split("\n## ") if part.startswith("Built into")]
+    assert tuple(sorted(name for name, *_ in rows(built))) == scene.BUILT_IN
