@@ -102,15 +102,13 @@ export function chart(host: HTMLElement, data: Chart, options: Options = {}): Pa
       if (lx > 4 && lx + room > w) (lx = 4), (ly += 18);
       symbol(lx);
       g.fillStyle = c.ink;
-      g.fillText(text, lx + size + 4, ly);
+      g.fillText(text, lx + size + 4, ly, w - size - 8);
       lx += room;
     };
     if (grouped && !data.value) data.groups!.forEach((name, i) => entry(name, 12, (x) => fill(g, c.group(i), () => marker(g, x + 6, ly, i, 4.5))));
-    if (data.value) {
-      entry(`${data.value.label} ±${brief(end, data.value.unit)}`, 90, (x) => {
-        for (let i = 0; i < 90; i++) fill(g, c.diverging(i / 44.5 - 1), () => g.rect(x + i, ly - 5, 1.5, 10));
-      });
-    }
+    if (data.value) entry(`${data.value.label} ±${brief(end, data.value.unit)}`, 60, (x) => {
+      for (let i = 0; i < 60; i++) fill(g, c.diverging(i / 30 - 1), () => g.rect(x + i, ly - 5, 2, 10));
+    });
     const legend = lx > 4 ? ly + 18 : 10;
     // Frame.
     const y = scale(axes.y, y0, y1);

@@ -376,7 +376,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   live.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     drawn = null;
-    spoken.textContent = "The browser lost the picture, waiting.";
+    spoken.textContent = "The browser lost the picture.";
   });
   live.addEventListener("webglcontextrestored", () => {
     begin();
