@@ -32,7 +32,7 @@ async function start(): Promise<void> {
     report(host, data);
     document.getElementById(decodeURIComponent(location.hash.slice(1)))?.scrollIntoView();
   } catch (error) {
-    host.textContent = `This report's data cannot be shown; browsers from 2023 or later can. ${error}`;
+    host.textContent = `The data cannot be shown; a browser from 2023 or later can. ${error}`;
     host.className = "bad";
     host.role = "alert";
   }

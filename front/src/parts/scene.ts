@@ -19,7 +19,7 @@ const [WIDE, HIGH] = [680, 460]; // px of a picture on paper
 type Entry = [text: string, colour: string, group?: number];
 
 export function scene(host: HTMLElement, data: Scene, options: Options = {}): Part<Scene> {
-  const label = options.label ?? "Network";
+  const label = options.label ?? "Scene";
   const legend = el("div.ce-legend");
   const live = el("canvas", { "aria-hidden": true });
   const self = surface(host, "scene", label, { paint, scheme: () => ((stale = true), keys()), raster: () => composed(2) });
@@ -120,7 +120,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     drawn = gl && drawing(gl, few);
     stale = true;
     if (drawn) return;
-    stage.replaceChildren(el("p.ce-none", {}, "No WebGL 2 in this browser: the table has all points and uncertainties."));
+    stage.replaceChildren(el("p.ce-none", {}, "No WebGL 2 in this browser: the table has all points."));
     self.bar.hidden = true;
   }
 
@@ -259,12 +259,12 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
       const press = button(text, () => {
         if (!hidden.delete(group)) hidden.add(group);
         stale = true;
-        keys();
-        (legend.children[group] as HTMLElement).focus();
+        state();
         dirty();
       });
+      const state = () => (press.ariaPressed = `${!hidden.has(group)}`);
+      state();
       press.prepend(swatch);
-      press.ariaPressed = `${!hidden.has(group)}`;
       return press;
     }));
   }
@@ -376,7 +376,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
   live.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     drawn = null;
-    spoken.textContent = "The browser lost the picture; waiting for it.";
+    spoken.textContent = "The browser lost the picture, waiting.";
   });
   live.addEventListener("webglcontextrestored", () => {
     begin();
@@ -390,7 +390,7 @@ export function scene(host: HTMLElement, data: Scene, options: Options = {}): Pa
     measure();
     mark(name === undefined ? -1 : points.name.indexOf(name));
     hover(-1);
-    over.ariaLabel = `${label}. ${points.name.length} points in space; the table has their values. Arrow keys turn, plus and minus zoom, Home shows all, Page Down and Page Up choose a point.`;
+    over.ariaLabel = `${label}. ${points.name.length} points in space; the table has their values. Arrow keys turn, + and − zoom, Home shows all, Page Down and Up choose a point.`;
     keys();
   }
   begin();

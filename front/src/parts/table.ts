@@ -80,7 +80,7 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   let all = false; // printing
   let count = 0;
 
-  const input = el("input", { type: "search", placeholder: "Filter: text, or u>0.5", "aria-label": `Filter of ${caption}` });
+  const input = el("input", { type: "search", placeholder: "Filter: text or u>0.5", "aria-label": `Filter ${caption}` });
   const size = el("span.ce-faint", { role: "status" });
   const spoken = el("span.ce-hidden", { "aria-live": "polite" });
   const body = el("tbody");
@@ -100,18 +100,19 @@ export function table(host: HTMLElement, data: Table, options: TableOptions = {}
   const text = (row: number) => (texts[row] ??= columns.map((c) => cell(c, row)).join(" ").toLowerCase());
 
   function header(): void {
-    head.replaceChildren(...columns.map((c, k) => {
+    const focus = [...head.children].indexOf(document.activeElement!.parentElement!);
+    head.replaceChildren(...columns.map((c) => {
       const down = sort?.key === c.key ? sort.down : null;
       const press = button(c.label, () => {
         sort = down ? null : { key: c.key, down: down === false };
         scroll.scrollTop = 0;
         arrange();
-        head.querySelectorAll("button")[k]!.focus();
       });
       press.append(el("small", {}, ` ${c.unit}`));
       // Buttons are not repeated on the next sheet of paper, texts are.
       return el(`th.ce-${c.kind}`, { "aria-sort": down === null ? "none" : down ? "descending" : "ascending" }, ...(all ? press.childNodes : [press]));
     }));
+    head.querySelectorAll("button")[focus]?.focus();
     // Fixed widths where rows come and go, from the longest text of each column.
     widths.replaceChildren();
     grid.classList.toggle("ce-fixed", windowed());
