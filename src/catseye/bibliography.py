@@ -26,7 +26,7 @@ SOURCES: dict[str, Source] = {
     "ISA182": Source(
         title="ANSI/ISA-18.2-2016, Management of alarm systems for the process industries",
         locator="International Society of Automation, 2016",
-        used="clause 5.5, states of an alarm: acknowledged, returned, shelved (`coordinator.alarms`)",
+        used="states of an alarm and their transitions: acknowledged, returned, shelved (`coordinator.alarms`)",
     ),
     "PARKER04": Source(
         title="D. H. Parker, Working notes on the Green Bank Telescope laser metrology system, 2004",

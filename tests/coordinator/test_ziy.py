@@ -39,6 +39,31 @@ def test_rounds_are_measured_reduced_journalled_and_acknowledged():
     run(story)
 
 
+def test_ranges_of_an_epoch_stand_behind_its_solution():
+    """As a document of their own; an unknown number is null, and the answer has none of it."""
+    from catseye.coordinator.journal.entries import Document, ranges_document
+    from coordinator.ziy_scene import Answer
+
+    class Ranged(ListLive):
+        def solve(self, ticks):
+            answer = super().solve(ticks)
+            object.__setattr__(answer, "ranges", {"shot": [1, 2], "w": [0.5, float("nan")]})
+            return answer
+
+    async def story():
+        async with Site(live=Ranged()) as site:
+            await until(lambda: site.live.epochs >= 2)
+            await until(lambda: any(isinstance(e, EpochSolution) for e in site.published))
+            rows = site.journal.rows
+            at = next(k for k, row in enumerate(rows) if isinstance(row, EpochSolution))
+            assert isinstance(rows[at + 1], Document)
+            assert (rows[at + 1].name, rows[at + 1].text) == ("epoch-ranges", '{"shot": [1, 2], "w": [0.5, null]}')
+            assert "ranges" not in rows[at].answer
+            assert ranges_document(1, Answer(1, 1)) is None
+
+    run(story)
+
+
 def test_journal_order_is_the_order_of_the_reductions_input():
     async def story():
         async with Site() as site:

@@ -362,3 +362,13 @@ def test_deviation_of_an_accelerating_telescope_is_half_a_t_squared(seconds, sha
 def test_deviation_of_the_telescope_is_limited_by_its_slew_rate():
     most = np.hypot(2.0 * AZIMUTH_SLEW, 2.0 * ELEVATION_SLEW)
     assert _unforeseen(1000.0) == pytest.approx(1000.0 * most, rel=1e-12)
+
+
+def test_sun_zone_is_the_almanacs_sun_with_the_records_cone(guard):
+    zone = guard.sun_zone(MORNING)
+    east, north, up = SUN
+    assert zone.azimuth == pytest.approx(np.arctan2(east, north) % (2.0 * np.pi), abs=1e-4)
+    assert zone.elevation == pytest.approx(np.arcsin(up), abs=1e-3)  # refraction
+    assert zone.cone == KeepClear(gbt()).keep_out.sun.half_angle_deg * DEGREE
+    assert zone.avoided
+    assert not guard.sun_zone(NIGHT).avoided

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from catseye.api.surface import surface
 from catseye.api.watching import watch_journal
 from catseye.coordinator.journal import writer
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, Run
@@ -16,10 +17,12 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal, JournalSettings
 from catseye.errors import InputError
 from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture, LiveWeather
+from catseye.reduction.site.motion import ground_from
 from catseye.service.settings import live_settings
 from catseye.simulator.clock.world_clock import ManualClock
 from cli.living_scene import recorded
-from journal_scene import PostgresServer
+from coordinator.ziy_scene import gbt
+from journal_scene import START, PostgresServer
 
 
 @pytest.fixture(scope="module")
@@ -359,6 +362,39 @@ def written(path, **settings):
         clock = ManualClock(reader.run().started / TICKS_PER_DAY)
         with Journal.open(path, run=run, clock=clock, settings=JournalSettings(**settings)) as journal:
             yield journal
+
+
+def test_surface_needs_prisms(watch):
+    with pytest.raises(InputError, match="needs 6 points, 5 given"):
+        watch.surface()
+
+
+def test_surface_is_that_of_the_recipe(tmp_path):
+    """Against `catseye.surface` with the same prisms and their joint covariance: a dish with a bump and noise."""
+    site, rng, posture = gbt(), np.random.default_rng(9), (2.5, 0.7)
+    names = sorted(n for n, t in site.targets.items() if t.shapes_dish)[::40]
+    local = np.array([site.targets[n].position_mm for n in names]) * 1e-3
+    local[:, 2] += 1e-3 * np.exp(-((local[:, 0] / 20.0) ** 2)) + 5e-5 * rng.standard_normal(len(names))
+    places = ground_from(site, "reflector", *posture).single.points(local)
+    root = rng.standard_normal((3 * len(names), 3 * len(names))) * 1e-5
+    covariance = root @ root.T / len(names) + 2.5e-9 * np.eye(3 * len(names))
+    answer = {"number": 1, "ticks": START, "azimuth": posture[0], "elevation": posture[1], "names": names}
+    clock = ManualClock(START / TICKS_PER_DAY)
+    with Journal.open(tmp_path / "dish.db", run=Run(site), clock=clock) as journal:
+        journal.append(EpochSolution(START, answer | {"x": places.tolist(), "used": [], "rejected": {}}, covariance))
+        journal.append().result(30.0)
+    table = jsoned(watch_journal(tmp_path / "dish.db").surface())
+    degrees = dict(zip(("azimuth_deg", "elevation_deg"), np.degrees(posture).tolist(), strict=True))
+    whole = surface(points=places, covariance=covariance, names=names, site=site, frame="ground", **degrees)
+    assert tuple(table["points"]["name"]) == whole.names
+    assert table["points"]["deviation"] == pytest.approx(whole.deviations.tolist(), abs=1e-12)
+    assert table["points"]["u"] == pytest.approx(whole.u.tolist())
+    assert table["focal_length"] == pytest.approx(whole.focal_length)
+    terms = whole.tables()["zernike"]
+    assert [term["value"] for term in table["zernike"]] == pytest.approx(terms["value"].to_value("m").tolist())
+    assert [term["u"] for term in table["zernike"]] == pytest.approx(terms["u"].to_value("m").tolist())
+    assert table["actuators"]["name"] == names
+    assert np.abs(np.array(table["actuators"]["value"]) + whole.deviations).max() < 2e-4  # each undoes its own error
 
 
 def test_journal_that_is_written_is_watched(tmp_path, entries):

@@ -154,6 +154,49 @@ def test_watch_begins_before_its_coordinator():
     run(story)
 
 
+class Babbler(asyncio.Protocol):
+    """A port that answers every line with a line of the grammar that says nothing sensible, pushes among them."""
+
+    BODIES = (
+        "STATUS 1, a, b, c, d, e, f, g, h, i, j, k, l",
+        "SHOT 1, x, y",
+        "EPOCH 1, 1e999",
+        "RANGERS 1",
+        "VER 1, X, 1",
+    )
+
+    def connection_made(self, transport):
+        self.transport = transport
+        transport.write(b"0\t52889.1\tHELLO This is something\n\x00\xff\n")
+
+    def data_received(self, data):
+        for line in data.decode("ascii").splitlines():
+            tid, _, body = line.partition("\t")
+            own = body.split()[0]
+            for words in (*self.BODIES, f"{own} 1, rubbish", f"{own} 0, no"):
+                self.transport.write(f"{tid}\t52889.12500000\t{words}\n".encode())
+                self.transport.write(f"0\t52889.12500000\t{words}\n".encode())
+
+
+def test_nonsense_from_a_port_ends_no_watch():
+    async def story():
+        listener = await network().serve(Babbler, LOOPBACK, 0)
+        watch = SiteWatch(gbt(), coordinator=(LOOPBACK, listener.port), network=network(), clock=LoopClock())
+        states = []
+        watch.listeners.append(lambda kind, item: states.append(kind))
+        watching = asyncio.ensure_future(watch.run())
+        await asyncio.sleep(60.0)
+        assert not watching.done()
+        assert watch.state()["connected"] is False
+        assert states.count("state") >= 59
+        json.dumps([watch.state(), watch.shots(), watch.events(), watch.epochs()], allow_nan=False)
+        watching.cancel()
+        await asyncio.gather(watching, return_exceptions=True)
+        await listener.close()
+
+    run(story)
+
+
 def test_without_a_journal_the_last_hour_is_in_memory():
     async def story():
         async with Watched() as site:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,10 @@ from catseye.service.watch.history import History
 from catseye.service.watch.index import first_seq
 from catseye.service.watch.site_map import SiteMap
 from catseye.service.watch.solutions import answer_of
+
+if TYPE_CHECKING:
+    from catseye.records.site.folder import SiteFolder
+    from catseye.reduction.surface.shape import SurfaceShape
 
 MOST_STRAY = 300  # rejected shots outside the epoch's own span of numbers that are looked up singly
 RANGES_BEHIND = text("SELECT seq, name, text FROM documents WHERE run = :run AND seq > :seq ORDER BY seq LIMIT 4")
@@ -186,7 +190,10 @@ def residuals_object(record: EpochRecord, site: SiteMap) -> Object:
 
 
 def air_object(record: EpochRecord, site: SiteMap, weather: Sequence[Object]) -> Object:
-    """Air along each path of an epoch, and what the adjustment says of the weather stations."""
+    """Air along each path of an epoch, and what the adjustment says of the weather stations.
+
+    `u` is what a path's index fluctuates by the site's records.
+    """
     shots, ranges, answer = record.shots(), record.ranges(), record.answer
     last: dict[tuple[str, str], tuple[float | None, float | None]] = {}
     for shot, index in zip(*(ranges.get(key, ()) for key in ("shot", "refractivity_ppm")), strict=True):
@@ -316,7 +323,7 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     return {
         "epoch": record.number,
         "points": deviations,
-        "actuators": None,
+        "actuators": _actuators(shape, records),
         "aperture": {"x": centre[0], "y": centre[1], "radius": radius},
         "zernike": zernike,
         "rms": number(float(np.sqrt(np.mean(fit.deviation**2)))),
@@ -324,6 +331,24 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
         "verdict": result.verdict.word,
         "verdict_text": result.verdict.why,
     }
+
+
+def _actuators(shape: "SurfaceShape", records: "SiteFolder") -> Object | None:
+    """Corrections of the actuators under the measured prisms, m; None where they cannot be determined.
+
+    Those between are as `catseye surface` has them with `actuators`: from few prisms they say little.
+    """
+    from catseye.errors import EstimationError
+    from catseye.reduction.surface.actuators import actuators_of, corrections
+
+    names, places = actuators_of(records)
+    rows = [k for k, name in enumerate(names) if name in shape.prisms.names]
+    try:
+        result = corrections(shape, tuple(names[k] for k in rows), places[rows])
+    except EstimationError:
+        return None
+    columns = {axis: numbers(result.places[:, k].tolist()) for k, axis in enumerate("xy")}
+    return {"name": list(result.names)} | columns | {"value": numbers(result.correction.tolist())}
 
 
 def jsoned(table: NDArray[np.float64]) -> list[list[float | None]]:

@@ -198,11 +198,14 @@ class SitePort:
         sun = await self._asked(client, "SUN")
         if status.ok is not True or len(status.values) < 12:
             raise Silent(f"STATUS is answered {status.text[:80]!r}")
+        try:
+            self._state = self._assembled(status, rangers, plan, alarms, sun)
+        except (ValueError, IndexError, OverflowError, InputError) as problem:
+            raise Silent(f"the coordinator's answers cannot be read: {problem}") from problem
         self._heard_ticks = ticks_now(self._clock)
         if self._is_silent:
             self._is_silent = False
             LOG.info("connected to the coordinator at %s port %d", *self.address)
-        self._state = self._assembled(status, rangers, plan, alarms, sun)
 
     async def _asked(self, client: ZyClient, command: str, *parameters: object) -> Reply:
         try:
@@ -256,7 +259,7 @@ class SitePort:
         kind, ticks, values = pushed
         try:
             item = _READERS[kind](mjd_of(ticks), values)
-        except (ValueError, IndexError):
+        except (ValueError, IndexError, OverflowError):
             LOG.warning("a line of the coordinator cannot be read: %s %s", kind, ", ".join(values)[:200])
             return
         if kind == "SHOT":
