@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from web.listeners import is_cut
 from web.page_scene import MJD, TOKEN, sent_raw, served_page
 
 from catseye.web import live, protocols  # isort: skip - after the skip of the scene
@@ -226,7 +227,7 @@ def test_a_stuck_client_loses_events_and_is_cut_off_and_slows_nobody(page, monke
                     heard.append(time.monotonic() - message["data"]["sent"])
                 lags.extend([message] if message["kind"] == "lag" else [])
 
-    with contextlib.closing(stuck_socket(page)), joined(page) as client:
+    with contextlib.closing(stuck_socket(page)) as stuck, joined(page) as client:
         threading.Thread(target=listen, args=(client,), daemon=True).start()
         wait_for(lambda: len(page.subject.feed.clients) == 2)
         count = 0
@@ -238,6 +239,7 @@ def test_a_stuck_client_loses_events_and_is_cut_off_and_slows_nobody(page, monke
             time.sleep(0.01)
         wait_for(lambda: len(page.subject.feed.clients) == 1)
         wait_for(lambda: len(heard) == count)
+        wait_for(lambda: is_cut(stuck))
         assert not lags
         assert max(heard) < 1.0  # s; the queue of the other was full for 2
     assert page.subject.feed.dropped["shot"] > 0

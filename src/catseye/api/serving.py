@@ -5,12 +5,12 @@ They install handlers of SIGINT and SIGTERM, and are not exported from `catseye`
 
 import asyncio
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 from catseye.api.journal import mjd_argument
-from catseye.api.live.beside import site_page
+from catseye.api.live.beside import SitePage, site_page
 from catseye.api.live.limits import LAST_PORT, one_of, within
 from catseye.api.reading import place_of
 from catseye.api.units import In, with_units
@@ -212,7 +212,6 @@ def serve(
 
     Raises InputError and ArgumentError as `ziy`.
     """
-    from catseye.service.child import LiveChild
     from catseye.service.serving import LogOptions, serve_coordinator
     from catseye.service.simulation import twin_arguments
 
@@ -242,21 +241,6 @@ def serve(
             at_once=screen,
         )
 
-    async def keep_twin(log: "LiveLog") -> None:
-        await LiveChild(
-            "twin",
-            twin_arguments(str(site), world, port_base),
-            said=lambda line: log.tell("twin", "listens", f"{len(peers.rangers)} rangers and the feed listen"),
-            warned=lambda line: log.tell("twin", "child", line, "warning"),
-        ).keep(patient=True)
-
-    async def children(log: "LiveLog", own_port: "asyncio.Future[int]") -> None:
-        async with asyncio.TaskGroup() as tasks:
-            if twin:
-                tasks.create_task(keep_twin(log))
-            if beside is not None:
-                tasks.create_task(beside.keep(log, (given.host, await own_port)))
-
     return serve_coordinator(
         records,
         given,
@@ -264,8 +248,40 @@ def serve(
         offset=world.offset if twin else 0.0,
         seed=seed if twin else None,
         log_options=LogOptions(tell, log_json, screen),
-        beside=children if twin or beside is not None else None,
+        beside=_children(
+            twin_arguments(str(site), world, port_base) if twin else None, len(peers.rangers), beside, given.host
+        ),
     )
+
+
+def _children(
+    twin: Sequence[str] | None, rangers: int, page: SitePage | None, host: str
+) -> "Callable[[LiveLog, asyncio.Future[int]], Coroutine[Any, Any, None]] | None":
+    """Coroutine function that keeps the children of a site; None without any.
+
+    twin      arguments of the twin's process
+    rangers   their number, for people
+    host      of the coordinator's own port
+    """
+    from catseye.service.child import LiveChild
+
+    if twin is None and page is None:
+        return None
+
+    async def children(log: "LiveLog", own_port: "asyncio.Future[int]") -> None:
+        async with asyncio.TaskGroup() as tasks:
+            if twin is not None:
+                child = LiveChild(
+                    "twin",
+                    twin,
+                    said=lambda line: log.tell("twin", "listens", f"{rangers} rangers and the feed listen"),
+                    warned=lambda line: log.tell("twin", "child", line, "warning"),
+                )
+                tasks.create_task(child.keep(patient=True))
+            if page is not None:
+                tasks.create_task(page.keep(log, (host, await own_port)))
+
+    return children
 
 
 def coordinator_orders(

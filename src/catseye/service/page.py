@@ -5,7 +5,7 @@ import json
 import socket
 import ssl
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -102,11 +102,7 @@ class PageAddress:
 
     def url(self) -> str:
         """Address for a browser, without the token."""
-        try:
-            wild = ipaddress.ip_address(self.host).is_unspecified
-        except ValueError:
-            wild = False
-        name = (self.names[0] if self.names else socket.gethostname()) if wild else self.host
+        name = reachable(self.host, self.names)
         shown = f"[{name}]" if ":" in name else name
         return f"{'http' if self.certificate is None else 'https'}://{shown}:{self.port}/"
 
@@ -125,6 +121,19 @@ class PageAddress:
             names=self.names,
             **subject,
         )
+
+
+def reachable(host: str, names: Sequence[str] = ()) -> str:
+    """Name to connect to a listener: its host, or a name of this machine where it listens at all addresses.
+
+    >>> reachable("127.0.0.1"), reachable("0.0.0.0", ["site.example"])
+    ('127.0.0.1', 'site.example')
+    """
+    try:
+        wild = ipaddress.ip_address(host).is_unspecified
+    except ValueError:
+        return host
+    return (names[0] if names else socket.gethostname()) if wild else host
 
 
 def refuse_files(address: PageAddress) -> None:

@@ -6,6 +6,8 @@ answer, or of its events, for 20 s is cut off; there are 512 connections at most
 
 import asyncio
 import resource
+import socket
+import struct
 from contextlib import suppress
 from typing import Any
 
@@ -30,6 +32,7 @@ MOST_HEADER = 16_384  # bytes of headers that are not complete
 LONGEST_MESSAGE = 65_536  # bytes of a client's WebSocket message
 LONGEST_END = 1  # s from SIGTERM until answers under way are cut off
 BACKLOG = 256  # connections not yet accepted
+AT_ONCE = struct.pack("ii", 1, 0)  # struct linger: close sends a reset
 INCOMPLETE = frozenset({h11.IDLE, h11.SEND_BODY})  # states of a client whose request is under way
 
 
@@ -93,6 +96,14 @@ class _Unstuck:
 
     def _cut_stuck(self) -> None:
         self.config.refusals.refused("stuck", self.client, f"nothing taken for {STUCK_SECONDS:g} s")
+        self.reset()
+
+    def reset(self) -> None:
+        """End the connection at once: what the client has not taken is thrown away by the kernel, too."""
+        sock = self.transport.get_extra_info("socket")
+        if sock is not None:
+            with suppress(OSError):
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, AT_ONCE)
         self.transport.abort()
 
 
@@ -108,7 +119,7 @@ class LimitedHttp(_Unstuck, H11Protocol):
         if len(self.connections) > MOST_CONNECTIONS:
             text = f"more than {MOST_CONNECTIONS} connections"
             self.config.refusals.refused("connections", self.client, text)
-            transport.abort()
+            self.reset()
             return
         self.watch_writing()
         self._wait_for_request()
@@ -160,7 +171,7 @@ class LimitedHttp(_Unstuck, H11Protocol):
     def _cut_slow(self) -> None:
         if self._begun:
             self.config.refusals.refused("slow", self.client, f"request not complete after {REQUEST_SECONDS:g} s")
-        self.transport.abort()
+        self.reset()
 
 
 class LimitedWebSocket(_Unstuck, WebSocketsSansIOProtocol):

@@ -26,7 +26,9 @@ class SitePage:
         log           of the site
         coordinator   its host and port
         """
-        from catseye.service.page import PageChild
+        from catseye.service.page import PageChild, reachable
+
+        host, port = coordinator
 
         def listening(actual: "PageAddress") -> None:
             log.tell("page", "listens", f"browsers connect to {actual.url()}")
@@ -35,7 +37,7 @@ class SitePage:
 
         page = PageChild(
             self.address,
-            lambda actual: actual.settings("site", coordinator=coordinator, **self._subject),
+            lambda actual: actual.settings("site", coordinator=(reachable(host), port), **self._subject),
             listening=listening,
             warned=lambda line: log.tell("page", "child", line, "warning"),
         )
