@@ -62,7 +62,7 @@ def site(tmp_path_factory) -> Iterator[LivingSite]:
         "key": None,
         "site": "gbt",
         "coordinator": ["127.0.0.1", port],
-        "rangers": {name: [host, first] for name, (host, first, _) in at["rangers"].items()},
+        "rangers": {name: [host, second] for name, (host, _, second) in at["rangers"].items()},
         "journal": str(journal),
     }
     living = LivingSite(

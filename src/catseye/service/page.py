@@ -34,7 +34,7 @@ class PageSettings(BaseModel):
     certificate, key   files of TLS, needed beyond this machine
     names         further names and addresses that it is called by
     site, coordinator, rangers, journal   of a site: folder or name, host and port of the coordinator and of each
-                  ranger's first port, place of the journal
+                  ranger's second port, for its console, place of the journal
     journal       place of a journal
     path          of a result
     """

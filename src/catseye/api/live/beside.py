@@ -81,5 +81,5 @@ def site_page(
     at_once = at_once and address.port != 0
     if at_once:
         announce(page_words(address))
-    rangers = {name: (each.host, each.ports[0]) for name, each in subject["rangers"].items()}
+    rangers = {name: (each.host, each.ports[1]) for name, each in subject["rangers"].items()}
     return SitePage(address, {**subject, "rangers": rangers}, None if at_once else announce)
