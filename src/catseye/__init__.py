@@ -16,6 +16,7 @@ from catseye.version import __version__
 if TYPE_CHECKING:
     from catseye.api.air_paths import acoustic, refractometer
     from catseye.api.baseline import baseline
+    from catseye.api.exploring import report_of
     from catseye.api.figures import (
         plot_aberration,
         plot_air,
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 FACE = {  # file of catseye.api -> its exported names
     "air_paths": ("acoustic", "refractometer"),
     "baseline": ("baseline",),
+    "exploring": ("report_of",),
     "figures": (
         "plot_aberration",
         "plot_air",
@@ -121,6 +123,7 @@ __all__ = [
     "reduce",
     "refractometer",
     "replay",
+    "report_of",
     "safety",
     "save",
     "save_triplet_form",

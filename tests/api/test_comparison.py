@@ -9,6 +9,7 @@ import pytest
 
 import catseye
 from catseye.errors import EstimationError
+from gateways.report_scene import column, read, texts, words_of
 from repository import TESTS
 
 EPOCHS = TESTS / "vectors" / "networks" / "epochs"
@@ -166,7 +167,10 @@ def test_every_file_of_a_comparison_is_written_for_every_dimension(tmp_path):
         out = Path(tmp_path / first)
         catseye.save(compared(first, second), out)
         page = (out / "report.html").read_text()
-        assert not re.search(r"\bnan\b", page)
+        report = read(page)
+        assert not re.search(r"\bnan\b", " ".join(words_of(page)) + texts(report))
+        assert set(column(report, "displacements", "dx" if "levels" in first else "dz")) == {None}
+        assert ("displacements" in report["scenes"]) == ("plane" in first)
         header, *rows = (out / "displacements.csv").read_text().splitlines()
         gone = ["dx_mm", "dy_mm"] if "levels" in first else ["dz_mm"]
         for row in rows:

@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from gateways.report_scene import column, read, words_of
 from repository import ROOT
 
 DATA = ROOT / "examples" / "baselines" / "busselton"
@@ -74,11 +75,14 @@ def test_tables_and_page_tell_the_same_as_the_object(catseye, tmp_path):
                 adjusted[line["from_pillar"], line["to_pillar"]], abs=1e-6
             )
     page = (out / "report.html").read_text()
-    assert page.count("<figure>") == 5
-    assert f"{found['zero'] * 1e3:+.3f}" in page
-    assert "the light follows the weather" in page
-    assert ">nan" not in page
-    assert " nan" not in page
+    report, words = read(page), " ".join(words_of(page))
+    assert {"line", "residuals", "weather", "correction-1", "cyclic", "cyclic-term"} <= report["charts"].keys()
+    assert f"{found['zero'] * 1e3:+.3f}" in words
+    assert "the light follows the weather as read" in column(report, "tests", "test")
+    assert column(report, "distances", "distance") == pytest.approx(
+        [d["distance"] for d in found["distances"]], abs=0.51e-7
+    )
+    assert "nan" not in words.split()
 
 
 def test_people_are_told_the_signs(catseye):

@@ -16,10 +16,13 @@ from catseye.constants import PPM
 from catseye.names import AIR_MODEL
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.air.refractometer_calibration import PathCalibration
     from catseye.reduction.air.sound_path import AcousticReduction
 
@@ -105,6 +108,12 @@ class AcousticResult(Result):
         from catseye.gateways.air.tables import MARK, path_temperatures_csv
 
         return {"table": SinglePage(MARK, lambda now, path: path_temperatures_csv(self.reduction.paths))}
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.air.acoustic_report import acoustic_report
+
+        return acoustic_report(self.reduction, when)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye acoustic --out`."""
@@ -215,9 +224,15 @@ class RefractometerResult(Result):
 
     def figures(self) -> "dict[str, Figure]":
         """The night with its residuals, and phase against weather."""
-        from catseye.gateways.air.refractometer_report import refractometer_figures
+        from catseye.gateways.air.refractometer_figures import refractometer_figures
 
         return refractometer_figures(self.calibration)
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.air.refractometer_report import refractometer_report
+
+        return refractometer_report(self.calibration, when)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye refractometer --out`."""

@@ -19,10 +19,13 @@ from catseye.errors import ArgumentError
 from catseye.reduction.baseline.settings import BaselineSettings
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.baseline.result import BaselineCalibration
 
 LARGEST = 1e4  # mm, ppm, °C, hPa, %: beyond it a unit was meant otherwise
@@ -106,6 +109,12 @@ class BaselineResult(Result):
             return record_text(self.calibration, self.hashes, name=name, **self.provenance)
 
         return {"record": SinglePage(MARK, text)}
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.baseline.report import baseline_report
+
+        return baseline_report(self.calibration, when, self.hashes)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye baseline --out`."""

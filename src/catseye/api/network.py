@@ -16,11 +16,14 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import ArgumentError, EstimationError
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.api.network_source import NetworkSource
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.network.adjusted import AdjustedNetwork
     from catseye.reduction.network.comparison import ComparedEpochs
     from catseye.reduction.network.treatment import AdjustmentOptions
@@ -193,6 +196,13 @@ class AdjustmentResult(Result):
         if not self.adjusted.answered:
             network = self.path or self.adjusted.network.source or "the network"
             raise EstimationError(f"{network}: {self.status}")
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        self.require_answer()
+        from catseye.gateways.network.report import network_report
+
+        return network_report(self.adjusted, when, self.inputs())
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye adjust --out`; EstimationError where there is no answer to write."""
@@ -400,9 +410,15 @@ class ComparisonResult(Result):
 
     def figures(self) -> "dict[str, Figure]":
         """Plan and elevation with displacements and their ellipses."""
-        from catseye.gateways.network.comparison_report import comparison_figures
+        from catseye.gateways.network.comparison_figures import comparison_figures
 
         return {name: drawn.figure for name, drawn in comparison_figures(self.compared).items()}
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.network.comparison_report import comparison_report
+
+        return comparison_report(self.compared, when, self.inputs())
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye adjust A B --out`."""

@@ -17,11 +17,13 @@ from catseye.names import NOTES_AIR_MODEL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from datetime import datetime
 
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.night.campaign import Campaign
     from catseye.reduction.budget.explanation import Explanation
     from catseye.reduction.epoch.epoch import Reduction
@@ -130,6 +132,12 @@ class NightResult(Result):
 
         return figures(self.reduction)
 
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.epoch.report import reduction_report
+
+        return reduction_report(self.reduction.held(), when)
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye reduce --out`."""
         from catseye.gateways.epoch.files import write_reduction
@@ -233,31 +241,36 @@ class ExplanationResult(Result):
 
     def figures(self) -> "dict[str, Figure]":
         """Contributions of the inputs and, after a Monte Carlo, its histogram."""
-        from catseye.gateways.epoch.explain_page import figures
+        from catseye.gateways.epoch.explain_figures import figures
 
         return figures(self.explanation) if self.explanation.budget is not None else {}
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """The page that `--page` writes, as explanation.html, with the table and the JSON."""
-        from catseye.gateways.epoch.explain_page import explanation_page
+        self.write_files(directory, progress, {"explanation.html": self._page})
 
-        self.write_files(
-            directory,
-            progress,
-            {"explanation.html": lambda now: explanation_page(self.explanation, self.campaign, now)},
-        )
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of the page that `--page` writes, made at a time, UTC."""
+        from catseye.gateways.epoch.explain_page import explanation_report
+
+        return explanation_report(self.explanation, self.campaign, when)
+
+    def _page(self, now: "datetime") -> str:
+        from catseye.gateways.writers.report_page import report_page
+
+        return report_page(self._report(now))
 
     def save_page(self, path: "str | os.PathLike[str]") -> Path:
         """Write the page of the shot, whole or not at all: a new HTML file, or an earlier page of a shot."""
         from datetime import UTC, datetime
 
-        from catseye.gateways.epoch.explain_page import MARK, explanation_page
+        from catseye.gateways.epoch.explain_page import MARK
         from catseye.gateways.writers.output import atomic_file, refuse_suffix
 
         where = Path(path)
         refuse_suffix(where, "page")
         with atomic_file(where, "page", MARK) as pieces:
-            pieces.append(explanation_page(self.explanation, self.campaign, datetime.now(UTC)))
+            pieces.append(self._page(datetime.now(UTC)))
         return where
 
     def lines(self) -> list[str]:

@@ -15,10 +15,13 @@ from catseye.api.units import In, with_units
 from catseye.errors import InputError
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.panels.layout import PanelLayout
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.panels.job import PanelWork
@@ -105,6 +108,12 @@ class PanelsResult(Result):
         from catseye.gateways.panels.figures import panel_figures
 
         return panel_figures(self.work)
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.panels.report import panels_report
+
+        return panels_report(self.work, when)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye panels --out`."""

@@ -14,11 +14,14 @@ from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.api.network_source import NetworkSource
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.reduction.network.plan import PlannedNetwork
 
 
@@ -88,6 +91,12 @@ class PlanResult(Result):
 
         drawn = network_figures(self.planned.predicted)
         return {name: drawn[name].figure for name in ("plan", "elevation") if name in drawn}
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.network.plan import plan_report
+
+        return plan_report(self.planned, when, self.inputs())
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye plan --out`."""

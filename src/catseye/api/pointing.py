@@ -16,10 +16,13 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.geometry.antenna.pointing_series import PointingSeries
     from catseye.records.laboratory.star_offsets import StarOffsets
     from catseye.records.network.written_pose import WrittenPose
@@ -102,6 +105,12 @@ class SeriesResult(Result):
         from catseye.gateways.pose.pointing_series_figures import fit_figures
 
         return fit_figures(self.findings.fit)
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.pose.pointing_series_files import fit_report
+
+        return fit_report(self.findings, when)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye pointing fit --out`."""

@@ -18,10 +18,13 @@ from catseye.errors import ArgumentError
 from catseye.processors import free_threads
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.pose.findings import PoseFindings
@@ -118,6 +121,12 @@ class PoseResult(Result):
         from catseye.gateways.pose.figures import pose_figures
 
         return pose_figures(self.found)
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.pose.files import pose_report
+
+        return pose_report(self.found, when, self.hashes)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye pose --out`."""

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.verdict import Verdict
 
 
@@ -88,6 +89,24 @@ class Result:
     def figures(self) -> "dict[str, Figure]":
         """Figures by their names; none unless a result has some."""
         return {}
+
+    def to_report(self) -> dict[str, Any]:
+        """Report of the answer as `report_of` reads it from its page, docs/formats/results.md.
+
+        Raises InputError for a result without a report, EstimationError where there is no answer.
+        """
+        from datetime import UTC, datetime
+
+        from catseye.gateways.writers.report import report_object
+
+        made = self._report(datetime.now(UTC))
+        if made is None:
+            raise InputError(f"a {type(self).__name__} has no report; its tables are to_table()")
+        return report_object(made)
+
+    def _report(self, when: "datetime") -> "ResultReport | None":
+        """Report, made at a time, UTC; None unless a result has one."""
+        return None
 
     def pages(self) -> dict[str, SinglePage]:
         """Single files by name, such as a record or a certificate."""

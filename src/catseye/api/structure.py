@@ -17,10 +17,13 @@ from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.reduction.structure.epochs import ReadEpochs
     from catseye.reduction.structure.findings import StructureFindings
@@ -138,6 +141,12 @@ class StructureResult(Result):
             "residuals": residual_figure(self.found.fit, self.found.check),
         }
 
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.structure.report import structure_report
+
+        return structure_report(self.found, when, self.hashes)
+
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye structure --out`."""
         from catseye.gateways.structure.files import write_structure
@@ -219,6 +228,12 @@ class VibrationResult(Result):
         from catseye.gateways.structure.figures import spectrum_figure
 
         return {"spectra": spectrum_figure(self.found)}
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.structure.report import vibration_report
+
+        return vibration_report(self.found, when, self.hashes)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye structure --vibration --out`."""

@@ -17,10 +17,13 @@ from catseye.constants import MILLIMETRE
 from catseye.errors import ArgumentError, InputError
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.optics.zernike import Numbering
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.surface.actuators import Travel
@@ -140,6 +143,12 @@ class SurfaceResult(Result):
         if found.actuators is not None:
             drawn["actuators"] = actuator_map(found.actuators, shape.aperture)
         return drawn
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.surface.report import surface_report
+
+        return surface_report(self.found, when, self.hashes)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye surface --out`."""

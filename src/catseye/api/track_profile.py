@@ -16,10 +16,13 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.errors import ArgumentError
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from astropy.table import QTable
     from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
+    from catseye.gateways.writers.report import ResultReport
     from catseye.records.laboratory.tilts import TiltReadings
     from catseye.records.network.written_pose import WrittenPose
     from catseye.reduction.pose.track_profile import TrackProfile
@@ -89,6 +92,12 @@ class TrackProfileResult(Result):
         from catseye.gateways.pose.pointing_series_figures import track_figures
 
         return track_figures(self.profile)
+
+    def _report(self, when: "datetime") -> "ResultReport":
+        """Report of `report.html`, made at a time, UTC."""
+        from catseye.gateways.pose.pointing_series_files import track_report
+
+        return track_report(self.profile, self.hashes, when)
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye pointing track --out`."""

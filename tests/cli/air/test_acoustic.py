@@ -11,6 +11,7 @@ from catseye.records.night.path_temperature import PathTemperature
 from catseye.records.night.recording import read_sheet, wav_bytes, wav_samples
 from catseye.signal.delay.arrival import DelayPlan
 from catseye.signal.delay.waveform import sampled
+from gateways.report_scene import column, read
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "acoustic"
@@ -90,11 +91,15 @@ def test_out_and_write_appear_whole(catseye, tmp_path):
     assert len(rows) == 5
     assert rows[1].startswith("61365.1000002")
     assert ",ZY103,ZEG41040L,14.96" in rows[1]
-    read = Folder(tmp_path).table(table.name, PathTemperature)  # as a campaign does
-    assert [row.u_temperature_c for row in read] == pytest.approx([0.0747, 0.0747, 0.0742, 0.0742], abs=2e-3)
-    page = (out / "report.html").read_text()
-    assert page.count("<img") == 3
-    assert "evening-1.wav" in page
+    listed = Folder(tmp_path).table(table.name, PathTemperature)  # as a campaign does
+    assert [row.u_temperature_c for row in listed] == pytest.approx([0.0747, 0.0747, 0.0742, 0.0742], abs=2e-3)
+    report = read((out / "report.html").read_text())
+    assert {key.partition("-")[0] for key in report["charts"]} == {
+        "recording", "correlation", "peak", "temperature", "wind",
+    }  # fmt: skip
+    assert "evening-1.wav" in column(report, "shots-0", "file")
+    temperatures = [float(row.split(",")[3]) for row in rows[1:]]
+    assert column(report, "shots-0", "temperature") == pytest.approx(temperatures, abs=6e-4)
     kept = json.loads((out / "acoustic.json").read_text())
     covariance = np.array(kept["paths"][0]["covariance_c2"])
     assert covariance.shape == (4, 4)

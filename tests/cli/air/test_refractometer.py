@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from gateways.report_scene import column, read, words_of
 from repository import ROOT
 
 EXAMPLE = ROOT / "examples" / "refractometer" / "path-a.csv"
@@ -46,9 +47,13 @@ def test_the_example_is_calibrated_and_its_jump_and_gap_are_named(catseye, tmp_p
     series = [(v - 1.0) * 1e6 for v in found["series"]["group_index"] if v is not None]
     np.testing.assert_allclose(index, series, atol=1e-4)
     page = (out / "report.html").read_text()
-    assert page.count("<figure>") == 2
-    assert "a jump of" in page
-    assert ">nan" not in page
+    report = read(page)
+    assert report["charts"].keys() == {"index", "residual", "temperature", "slope"}
+    assert [v for v in report["charts"]["index"]["y"]["values"][:438] if v is not None] == pytest.approx(
+        index, abs=6e-4
+    )
+    assert "a jump of" in " ".join(words_of(page))
+    assert column(report, "budget", "u") == pytest.approx([u * 1e6 for u in found["budget"].values()], rel=6e-4)
     provenance = json.loads((out / "provenance.json").read_text())
     assert set(provenance["inputs_sha256"]) == {"path-a.csv", "path-a.toml"}
 

@@ -7,6 +7,7 @@ import re
 import pytest
 
 from command_scene import COMMAND, attempt
+from gateways.report_scene import column, read, texts, words_of
 from panel_scene import EXAMPLE
 
 TOOL = ["--instrument", EXAMPLE / "tool.toml"]
@@ -81,8 +82,14 @@ def test_the_files_are_whole_and_agree_with_the_object(whole):
         provenance["inputs_sha256"]
     )
     page = (out / "report.html").read_text()
-    assert page.count("<img") == 5
-    assert not re.search(r"\b(nan|inf|None)\b", re.sub(r'base64,[^"]*', "", page))
+    report = read(page)
+    assert {"corners-as-found", "corners-as-left", "surface", "turning", "control-members-as-left"} <= set(
+        report["charts"]
+    )
+    turned = {(r["panel"], r["corner"]): float(r["turns_clockwise"]) for r in rows if r["verdict"] == "turn"}
+    keys = zip(column(report, "screws", "panel"), column(report, "screws", "corner"), strict=True)
+    assert dict(zip(keys, column(report, "screws", "turns"), strict=True)) == pytest.approx(turned, abs=6e-4)
+    assert not re.search(r"\b(nan|inf|None)\b", " ".join(words_of(page)) + texts(report))
 
 
 def test_people_are_told_in_words_and_a_table_of_a_layout_serves_as_well(catseye):

@@ -8,6 +8,7 @@ import pytest
 
 from catseye.constants import ARCSECOND, DEGREE
 from catseye.geometry.antenna.pointing_series import published
+from gateways.report_scene import column, read
 from repository import ROOT
 
 EXAMPLES = ROOT / "examples" / "pointing"
@@ -34,9 +35,12 @@ def test_a_report_a_model_and_the_stars_used_are_written(catseye, tmp_path):
     assert "arcsec; over" in said
     files = "observations.csv pointing.json pointing.toml provenance.json report.html samplers.fits"
     assert sorted(p.name for p in out.iterdir()) == files.split()
-    assert (out / "report.html").read_text().count("<img") == 3
+    report = read((out / "report.html").read_text())
     told = json.loads(catseye("pointing", "fit", used, "--json")[1])
     first = json.loads((out / "pointing.json").read_text())
+    assert column(report, "terms", "value") == pytest.approx(list(first["values_arcsec"].values()), abs=6e-5)
+    assert len(report["charts"]) == 6
+    assert [column(report, "correlations", f"r_{k + 1}")[k] for k in range(8)] == [1] * 8
     for term, value in first["values_arcsec"].items():  # files carry 1e-7 degrees
         assert told["values_arcsec"][term] == pytest.approx(value, abs=0.01)
     assert tomllib.loads(model.read_text())["terms"] == first["terms"]
@@ -130,7 +134,12 @@ def test_the_shipped_inclinometer_alone_gives_all_waves_but_the_first(catseye, t
     out = tmp_path / "out"
     assert catseye(*told, "--out", out)[0] == 0
     assert (out / "tilt.csv").read_text().startswith("azimuth_deg,tilt_east_without_wave_1_arcsec,")
-    assert ">nan<" not in (out / "report.html").read_text()
+    report = read((out / "report.html").read_text())
+    values = dict(
+        zip(column(report, "coefficients", "coefficient"), column(report, "coefficients", "value"), strict=True)
+    )
+    assert [name for name, value in values.items() if value is None] == lost
+    assert report["charts"].keys() == {"tilt", "residual-x", "residual-y"}
     assert "AN -2.9" in " ".join(catseye(*told)[1].split())
 
 

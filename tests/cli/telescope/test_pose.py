@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.constants import ARCSECOND
+from gateways.report_scene import column, read
 from kept_scene import reduction_directory
 from repository import ROOT
 
@@ -55,9 +56,12 @@ def test_pointing_writes_report_tables_and_tells_people(catseye, night, tmp_path
     found = json.loads((out / "pose.json").read_text())
     np.testing.assert_allclose(found["pointing"]["offset"], 0.0, atol=1e-12)  # a night against itself
     assert found["pointing"]["u_offset"][0] < 0.25 * ARCSECOND
-    page = (out / "report.html").read_text()
-    assert page.count("<img") == 2
-    assert "Beam and focus" in page
+    report = read((out / "report.html").read_text())
+    assert report["charts"].keys() == {"residuals", "terms-azimuth", "terms-elevation"}
+    assert "Beam and focus" in [section["title"] for section in report["sections"]]
+    scale = np.repeat([1e-3, ARCSECOND], 3)
+    u = np.sqrt(np.diag(found["covariance"])) / scale
+    assert column(report, "pose", "u") == pytest.approx(u, rel=6e-4)
     assert (out / "points.csv").read_text().count("\n") == 91
 
 

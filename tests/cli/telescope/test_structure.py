@@ -15,6 +15,7 @@ from catseye.geometry.frames.rotation import from_vector
 from catseye.records.network.solved_points import FORMAT
 from catseye.records.night.live import LiveShot, LiveWeather
 from catseye.simulator.clock.world_clock import ManualClock
+from gateways.report_scene import column, read, texts
 from journal_scene import START, scene_run
 
 NAMES = ("ZEG1", "ZEG2", "ZEG3", "ZEG4", "ZEG5")
@@ -96,9 +97,11 @@ def test_a_list_of_reductions_gives_the_planted_motion_and_all_files(catseye, ni
     rows = list(csv.DictReader((out / "residuals.csv").read_text().splitlines()))
     assert len(rows) == 70
     assert rows[0]["point"] == "ZEG1"
-    page = (out / "report.html").read_text()
-    assert page.count("data:image/svg+xml") == 2
-    assert "extrapolated" in page
+    report = read((out / "report.html").read_text())
+    assert report["charts"].keys() >= {*(f"motion-{k}" for k in range(1, 7)), "residuals-by-point", "left-out"}
+    assert "extrapolated" in texts(report)
+    x = [place[0] for name in NAMES for place in told["points"][name]["place"]]
+    assert sorted(column(report, "prediction", "x")) == pytest.approx(sorted(x), abs=0.51e-7)
 
 
 def test_folders_alone_have_a_posture_and_no_temperature(catseye, nights):
@@ -199,7 +202,9 @@ def test_ranges_at_full_rate_show_the_planted_vibration(catseye, journal, tmp_pa
     tables = read_samplers(out / "samplers.fits")
     assert list(tables) == ["SPECTRA", "RANGES"]
     assert len(np.asarray(tables["RANGES"].mjd)) == 3200
-    assert "data:image/svg+xml" in (out / "report.html").read_text()
+    report = read((out / "report.html").read_text())
+    assert report["drawings"]["spectra"].startswith("<?xml")
+    assert column(report, "peaks", "true")[0] == pytest.approx(top["likely_hz"], abs=1e-5)
     status, said, _ = catseye("structure", "--vibration", journal, "--points", "ZEG1")
     assert status == 0
     assert "1.2" in said

@@ -2,18 +2,22 @@
 
 import dataclasses
 import json
-from html import escape
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
 
 from catseye.gateways.epoch.explain import budget_lines, explanation_object, explanation_passages
-from catseye.gateways.epoch.explain_page import MARK, explanation_page, figures
+from catseye.gateways.epoch.explain_figures import figures
+from catseye.gateways.epoch.explain_page import MARK, explanation_report
 from catseye.gateways.writers.drawing import svgs
 from catseye.gateways.writers.objects import json_line
+from catseye.gateways.writers.report_page import report_page
 from catseye.reduction.budget.explanation import explain_shot
 from catseye.reduction.budget.scene import Assumptions
+from gateways.report_scene import column, read, row, texts, words_of
 
+WHEN = datetime(2026, 1, 2, tzinfo=UTC)
 KEYS = {
     "shot", "ranger", "target", "mjd_utc", "status", "reason", "range", "u_range", "expanded_uncertainty",
     "coverage_factor", "effective_degrees_of_freedom", "cycles", "margin", "slip_probability", "inputs",
@@ -131,26 +135,26 @@ def test_the_table_is_sorted_and_adds_up(explained):
 
 
 def test_page_is_self_contained_and_names_every_input(explained, reduction):
-    from datetime import UTC, datetime
-
     found = explained(3)
-    html = explanation_page(found, reduction.campaign, datetime(2026, 1, 2, tzinfo=UTC))
+    html = report_page(explanation_report(found, reduction.campaign, WHEN))
     assert MARK in html[:4096]
-    assert "http://" not in html.replace("http://www.w3.org", "")
-    assert "<script" not in html
-    for item in found.items:
-        assert item.given.name in html
-        assert escape(item.source) in html
-    assert html.count("<img") == 2
-    assert all(digest in html for digest in reduction.campaign.hashes.values())
+    report = read(html)
+    budget = found.budget
+    assert sorted(column(report, "budget", "input")) == sorted(item.given.name for item in found.items)
+    for item, part in zip(found.items, budget.contribution, strict=True):
+        shown = row(report, "budget", item.given.name)
+        assert shown["source"] == item.source
+        assert shown["contribution"] == pytest.approx(part * 1e6, abs=5.1e-5)
+    assert report["charts"].keys() == {"contributions", "histogram"}
+    assert report["charts"]["contributions"]["y"]["values"][0] == pytest.approx(budget.u * 1e6, abs=5.1e-4)
+    assert column(report, "inputs", "value") == list(reduction.campaign.hashes.values())
+    assert found.verdict.why in " ".join(words_of(html))
 
 
-def test_the_page_of_a_shot_without_a_range_has_no_figures(explained, reduction):
-    from datetime import UTC, datetime
-
-    html = explanation_page(explained(19), reduction.campaign, datetime(2026, 1, 2, tzinfo=UTC))
-    assert "blocked: return" in html
-    assert "<img" not in html
+def test_the_page_of_a_shot_without_a_range_has_no_charts(explained, reduction):
+    report = read(report_page(explanation_report(explained(19), reduction.campaign, WHEN)))
+    assert "blocked: return" in texts(report)
+    assert report["charts"] == {}
 
 
 def test_figures_are_drawn_the_same_each_time(explained):

@@ -37,6 +37,7 @@ from catseye.reduction.network.adjusted import adjusted, adjusted_network
 from catseye.reduction.network.comparison import ComparedEpochs
 from catseye.reduction.network.treatment import AdjustmentOptions
 from column_scene import assert_columns
+from gateways.report_scene import read, texts
 from repository import TESTS
 
 LENGTHS = {"slope_distance", "horizontal_distance", "height_difference", "vector", "coordinates"}  # kinds in m
@@ -546,7 +547,7 @@ def test_every_file_is_written_and_its_hash_kept(found, path, tmp_path):
     assert provenance["inputs_sha256"] == {"every.gkf": hashlib.sha256(path.read_bytes()).hexdigest()}
     assert read_json([(tmp_path / "adjustment.json").read_text(encoding="utf-8")]) == network_object(found)
     assert steps[-1] == ("writing", len(outputs), len(outputs))
-    assert "coordinates.csv" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "in coordinates.csv" in texts(read((tmp_path / "report.html").read_text(encoding="utf-8")))
 
 
 def test_a_folder_is_hashed_by_its_tables():
@@ -612,7 +613,7 @@ def test_files_of_two_epochs_are_in_one_directory(compared, tmp_path):
     assert {"epoch-2-adjustment.json", "epoch-2-report.html", "provenance.json"} <= names
     outputs = json.loads((tmp_path / "provenance.json").read_text(encoding="utf-8"))["outputs"]
     assert set(outputs) | {"provenance.json"} == names
-    assert "epoch-1-coordinates.csv" in (tmp_path / "epoch-1-report.html").read_text(encoding="utf-8")
+    assert "in epoch-1-coordinates.csv" in texts(read((tmp_path / "epoch-1-report.html").read_text(encoding="utf-8")))
 
 
 # Units: each number is the one in memory over the unit in its column's name ------------------------------------------

@@ -3,7 +3,6 @@
 import re
 from dataclasses import replace
 from datetime import UTC, datetime
-from html.parser import HTMLParser
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,59 +14,24 @@ from scipy.stats import chi2
 from catseye.estimation.deformation.comparison import compare
 from catseye.estimation.network.adjustment import adjust_network
 from catseye.estimation.quality.ellipsoid import PLAN, elevation_view
-from catseye.gateways.network import comparison_report as comparison
+from catseye.gateways.network import comparison_figures as comparison
 from catseye.gateways.network import figures
+from catseye.gateways.network import report as report_module
+from catseye.gateways.network import report_charts as charts_module
 from catseye.gateways.network.comparison_report import comparison_report
 from catseye.gateways.network.report import network_report
 from catseye.gateways.network.summary import direction_words
+from catseye.gateways.writers.report_page import report_page
 from catseye.records.network.folder import read_network_folder
 from catseye.records.network.gama import read_gama
 from catseye.reduction.network.adjusted import adjusted_network
 from catseye.reduction.network.comparison import ComparedEpochs
+from gateways.report_scene import column, read, row, texts
 from repository import TESTS
 
 NETWORKS = TESTS / "vectors" / "networks"
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 INPUTS = {"network.gkf": "ab" * 32}
-VOID = {"meta", "img", "link", "br"}
-
-
-class Balance(HTMLParser):
-    """Refuses a tag that is closed out of turn or a thing to fetch; keeps the cells of tables."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.sources, self.tables = [], [], []
-
-    def handle_starttag(self, tag, attrs):
-        assert tag not in ("script", "link", "iframe")
-        self.sources += [value for key, value in attrs if key in ("src", "href")]
-        if tag not in VOID:
-            self.open.append(tag)
-        if tag == "table":
-            self.tables.append([])
-        elif tag == "tr":
-            self.tables[-1].append([])
-        elif tag in ("td", "th"):
-            self.tables[-1][-1].append("")
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open and self.open[-1] in ("td", "th"):
-            self.tables[-1][-1][-1] += data
-
-
-def read(page):
-    reader = Balance()
-    reader.feed(page)
-    assert reader.open == []
-    assert reader.sources
-    assert all(source.startswith(("#", "data:image/svg+xml;base64,")) for source in reader.sources)
-    assert "@import" not in page
-    assert "url(" not in page
-    return reader.tables
 
 
 @pytest.fixture(scope="module")
@@ -94,63 +58,107 @@ def with_error(found, row, error):
     return adjusted_network(adjust_network(replace(network, groups=groups)))
 
 
-def test_page_is_self_contained_and_shows_every_point(tunnel, single):
+def report_of(found):
+    return read(report_page(network_report(found, WHEN, INPUTS)))
+
+
+def test_page_is_self_contained_and_shows_every_point_and_observation(tunnel, single):
     for found in (tunnel, single):
-        page = network_report(found, WHEN, INPUTS)
-        tables = read(page)
-        anchors = re.findall(r'href="#([a-z-]+)"', page)
-        assert len(anchors) == 7
-        assert all(f'id="{anchor}"' in page for anchor in anchors)
-        (points,) = (t for t in tables if t[0][0] == "point")
-        assert [row[0] for row in points[1:]] == list(found.names)
-        (observations, *_) = (t for t in tables if t[0][0] == "observation")
-        assert len(observations) - 1 == min(len(found.table), 100)
-        assert INPUTS["network.gkf"] in page
+        report = report_of(found)
+        sections = [section["id"] for section in report["sections"]]
+        assert [s for s in sections if s != "description"] == [
+            "network", "observations", "reliability", "points", "datum", "provenance",
+        ]  # fmt: skip
+        assert column(report, "points", "point") == list(found.names)
+        assert len(column(report, "observations", "observation")) == len(found.table)
+        assert column(report, "inputs", "value") == [INPUTS["network.gkf"]]
 
 
-def test_large_network_report_lists_the_worst(ranging):
-    page = network_report(ranging, WHEN, INPUTS)
-    tables = read(page)
-    assert len(page) < 3e6
-    assert "The 100 worst of 9000; all are in observations.csv." in page
-    assert "The 200 weakest of 518; all are in coordinates.csv." in page
-    (observations,) = (t for t in tables if t[0][0] == "observation")
-    statistic = [abs(float(row[4])) for row in observations[1:]]
-    assert statistic == sorted(statistic, reverse=True)
-    assert len(statistic) == 100
-    (points,) = (t for t in tables if t[0][0] == "point")
-    longest = [float(row[9].split(" / ")[0]) for row in points[1:]]
+def test_its_numbers_are_those_of_the_network(ranging):
+    report = report_of(ranging)
+    places = {name: k for k, name in enumerate(ranging.names)}
+    order = [places[name] for name in column(report, "points", "point")]
+    for k, axis in enumerate("xyz"):
+        np.testing.assert_allclose(column(report, "points", axis), ranging.x[order, k], rtol=0, atol=0.51e-7)
+        np.testing.assert_allclose(column(report, "points", f"u_{axis}"), 1e3 * ranging.u[order, k], rtol=6e-4)
+    worst = ranging.table.worst_first
+    np.testing.assert_allclose(
+        column(report, "observations", "residual"), 1e3 * ranging.table.residual[worst], rtol=6e-6, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        column(report, "observations", "statistic"), ranging.statistic[worst], rtol=0, atol=0.51e-4
+    )
+
+
+def test_large_network_report_lists_all_worst_first(ranging):
+    page = report_page(network_report(ranging, WHEN, INPUTS))
+    report = read(page)
+    assert len(page) < 1.5e6
+    assert "All 9000, worst first." in texts(report)
+    statistic = np.abs(column(report, "observations", "statistic"))
+    assert (np.diff(statistic) <= 0.0).all()
+    assert len(statistic) == 9000
+    assert len(report["scenes"]["network"]["beams"]["value"]) == 9000
+
+
+def test_the_largest_networks_report_lists_the_worst(ranging, monkeypatch):
+    monkeypatch.setattr(report_module, "MOST_OBSERVATIONS", 100)
+    monkeypatch.setattr(report_module, "MOST_POINTS", 200)
+    monkeypatch.setattr(charts_module, "MOST_BEAMS", 300)
+    report = report_of(ranging)
+    said = texts(report)
+    assert "The 100 worst of 9000; all are in observations.csv." in said
+    assert "The 200 weakest of 518; all are in coordinates.csv." in said
+    assert "The 300 worst of 9000 observed pairs." in said
+    assert len(column(report, "observations", "statistic")) == 100
+    longest = column(report, "points", "semi_axis_1")
     assert longest == sorted(longest, reverse=True)
     assert longest[0] == pytest.approx(1e3 * ranging.ellipsoid.semi_axes.max(), rel=1e-3)
-    assert re.search(r"one in \d+ of 9000 observed pairs", page)
+    worst = max(abs(value) for value in report["scenes"]["network"]["beams"]["value"])
+    assert worst == pytest.approx(np.abs(ranging.statistic).max(), abs=5.1e-4)
+    assert len(report["charts"]["w-by-number"]["x"]["values"]) == 300
 
 
 def test_a_blunder_leads_the_table_of_observations(ranging):
     found = with_error(ranging, 1234, 0.002)
-    tables = read(network_report(found, WHEN, INPUTS))
-    (observations,) = (t for t in tables if t[0][0] == "observation")
-    assert observations[1][0] == ranging.label(1234)
-    assert observations[1][-1] == "suspect"
+    report = report_of(found)
+    assert column(report, "observations", "observation")[0] == ranging.label(1234)
+    assert column(report, "observations", "remark")[0] == "suspect"
 
 
 def test_undetermined_network_names_what_is_undetermined(tunnel):
     points = tunnel.network.points
     loose = replace(tunnel.network, points=replace(points, datum=np.zeros_like(points.datum)))
-    found = adjusted_network(adjust_network(loose))
-    page = network_report(found, WHEN, INPUTS)
-    tables = read(page)
-    assert "rank deficient" in page
-    (rows,) = (t for t in tables if t[0][0] == "point")
-    assert {row[6] for row in rows[1:]} == {"–"}  # no uncertainty is claimed
-    assert "uncertainties unknown" in page
+    report = report_of(adjusted_network(adjust_network(loose)))
+    assert "rank deficient" in report["verdict"]["why"] + texts(report)
+    assert set(column(report, "points", "u_x")) == {None}  # no uncertainty is claimed
+    assert "uncertainties are unknown" in texts(report)
+    assert "covariance" not in report["scenes"]["network"]["points"]
 
 
 def test_no_name_breaks_the_page(tunnel):
     points = tunnel.network.points
-    odd = ("<script>alert(1)</script>", '"><img src=x onerror=y>', "$x^2$", *points.names[3:])
+    odd = ("</script><script>alert(1)</script>", '"><img src=x onerror=y>', "$x^2$", *points.names[3:])
     network = replace(tunnel.network, points=replace(points, names=odd), description="<b>bold</b>", source="<i>.gkf")
     found = adjusted_network(replace(tunnel.solution, network=network))
-    read(network_report(found, WHEN, {"<u>": "x"}))
+    report = read(report_page(network_report(found, WHEN, {"<u>": "x"})))
+    assert column(report, "points", "point")[:3] == list(odd[:3])
+
+
+def test_the_scene_is_right_handed_whatever_the_axes_of_the_file(tunnel):
+    """The tunnel's x is south and its y west: the scene is in x east, y north, z up, and says so."""
+    report = report_of(tunnel)
+    scene = report["scenes"]["network"]
+    row = scene["points"]["name"].index("4901")
+    own = tunnel.solution.index["4901"]
+    assert scene["frame"] == "x east, y north, z up"
+    assert [scene["points"][axis][row] for axis in "xyz"] == pytest.approx(tunnel.solution.x[own], abs=1e-7)
+    assert scene["points"]["covariance"]["xx"][row] == pytest.approx(
+        tunnel.solution.covariance[own][0, 0] * tunnel.factor, rel=6e-4
+    )
+    assert "The tables have the axes of the file." in texts(report)
+    held = {scene["groups"][k] for k, name in zip(scene["points"]["group"], scene["points"]["name"], strict=True)}
+    assert held <= {"station", "target", "held point", "held station"}
 
 
 def test_the_scale_of_the_ellipsoids_is_drawn_as_it_is_stated(tunnel, single):
@@ -232,14 +240,29 @@ def compared(tunnel):
 
 
 def test_report_of_two_epochs_names_moved_points_and_distances(compared):
-    page = comparison_report(compared, WHEN, INPUTS)
-    tables = read(page)
-    rows = {row[0]: row for row in next(t for t in tables if t[0][0] == "point")}
-    assert (rows["35"][1], float(rows["35"][3])) == ("moved", pytest.approx(4.0, abs=1e-3))
-    assert {row[1] for name, row in rows.items() if name not in ("35", "point")} == {"stable"}
-    assert compared.deformation.status[1:] in page
-    assert "95 % confidence ellipses" in page
-    assert "level of the tests" in page
+    report = read(report_page(comparison_report(compared, WHEN, INPUTS)))
+    names, words = (column(report, "displacements", key) for key in ("point", "verdict"))
+    moved = row(report, "displacements", "35")
+    assert (moved["verdict"], moved["dy"]) == ("moved", pytest.approx(4.0, abs=1e-3))
+    assert {word for name, word in zip(names, words, strict=True) if name != "35"} == {"stable"}
+    assert compared.deformation.status[1:] in texts(report)
+    assert "level of the tests" in column(report, "settings", "name")
+    assert column(report, "epoch-1", "quantity")[0] == "Variance factor"
+
+
+def test_the_scene_of_two_epochs_has_the_displacements_at_their_scale(compared):
+    report = read(report_page(comparison_report(compared, WHEN, INPUTS)))
+    scene = report["scenes"]["displacements"]
+    groups = {
+        name: scene["groups"][k] for name, k in zip(scene["points"]["name"], scene["points"]["group"], strict=True)
+    }
+    assert groups["35"] == "moved"
+    assert set(groups.values()) == {"moved", "stable", "not compared"}
+    stated = re.search(r"drawn ([\d\u2009]+) times as long", texts(report)).group(1)
+    (line,) = (line for line in scene["lines"] if line["name"] == "displacement of 35")
+    drawn = np.array([line[axis][1] - line[axis][0] for axis in "xyz"])
+    shift = compared.deformation.displacement[compared.deformation.names.index("35")]
+    np.testing.assert_allclose(drawn, float(stated.replace("\u2009", "")) * shift, atol=1.1e-4)
 
 
 def test_arrows_go_where_the_points_went_and_ellipses_are_theirs(compared):

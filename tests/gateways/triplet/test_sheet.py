@@ -5,7 +5,6 @@ import io
 import re
 from dataclasses import replace
 from datetime import UTC, datetime
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -13,16 +12,18 @@ import pytest
 from catseye.gateways.triplet.figure import triplet_figure
 from catseye.gateways.triplet.form import DATA_SHEET, HEAD, PLATE, RANGES, blank_form
 from catseye.gateways.triplet.objects import triplet_object
-from catseye.gateways.triplet.sheet import cell, html_sheet, results, text_sheet
+from catseye.gateways.triplet.sheet import cell, results, text_sheet, triplet_report
 from catseye.gateways.triplet.symbols import PLACEMENT, UNIT, point_places, symbol_values
 from catseye.gateways.triplet.symbols import PLATE as PLATE_SYMBOLS
 from catseye.gateways.triplet.tables import triplets_csv
 from catseye.gateways.writers.drawing import svg as svg_of
 from catseye.gateways.writers.objects import json_line, plain
+from catseye.gateways.writers.report_page import report_page
 from catseye.records.files.reading import read_record
 from catseye.records.laboratory.triplet_measurement import TripletMeasurement
 from catseye.reduction.triplet.unit import reduce_triplet
 from column_scene import assert_columns
+from gateways.report_scene import column, read, row, words_of
 from triplet_scene import SHEET, document, measurement
 
 # section 3.4, in the order of the memo; T1, T2, S and so on are points
@@ -36,21 +37,6 @@ MEMO = [
 ]
 # fmt: on
 POINTS = ["T_1", "T_2", "MP", "BC", "PP_1", "PP_2", "S", "BC_fp"]
-
-
-class Text(HTMLParser):
-    """What a reader of a page sees."""
-
-    def __init__(self, page):
-        super().__init__()
-        self.words, self.tags = [], []
-        self.feed(page)
-
-    def handle_data(self, data):
-        self.words.append(data)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
 
 
 @pytest.fixture(scope="module")
@@ -120,33 +106,39 @@ def test_the_text_has_a_line_for_every_symbol_and_a_column_for_every_placement(f
     assert any(line.startswith("H_corr      -0.0230 mm") for line in lines)
 
 
+def page_of(found, file="TR99.toml"):
+    return report_page(triplet_report(found, file, datetime(2026, 11, 21, tzinfo=UTC), "ab" * 32))
+
+
 def test_page_is_self_contained_and_has_the_same_values(found):
-    page = html_sheet(found, "TR99.toml", datetime(2026, 11, 21, tzinfo=UTC), "ab" * 32)
-    text = Text(page)
-    words = " ".join(text.words)
-    for symbol in (*UNIT, *PLATE_SYMBOLS, *PLACEMENT):
-        assert symbol.label in text.words, symbol.name
-        assert cell(symbol, symbol_values(symbol, found)[0]) in text.words, symbol.name
-    assert "ab" * 32 in words
-    assert "-0.0230 mm" in words
-    assert not [tag for tag, _ in text.tags if tag in ("script", "link")]
-    assert all(attrs["src"].startswith("data:") for tag, attrs in text.tags if tag == "img")
+    page = page_of(found)
+    report = read(page)
+    for table, symbols in (("unit", UNIT), ("plate", PLATE_SYMBOLS), ("ranges", PLACEMENT)):
+        for symbol in symbols:
+            shown = row(report, table, symbol.label)
+            assert shown["value_1"] == cell(symbol, symbol_values(symbol, found)[0]), symbol.name
+    assert column(report, "inputs", "value") == ["ab" * 32]
+    assert "-0.0230 mm" in " ".join(words_of(page))
+    placements = report["charts"]["placements"]
+    assert placements["y"]["values"] == pytest.approx([h * 1e6 for h in found.h], abs=5.1e-3)
+    assert placements["limits"] == pytest.approx([found.l_mpbc * 1e6 + side for side in (-150.0, 0.0, 150.0)], rel=1e-5)
 
 
 def test_names_from_a_sheet_cannot_become_tags():
     found = reduce_triplet(measurement(by="<b>bold & brave</b>"))
-    page = html_sheet(found, "<i>.toml", datetime(2026, 11, 21, tzinfo=UTC), "00")
+    page = page_of(found, "<i>.toml")
     assert "<b>bold" not in page
     assert "<i>.toml" not in page
+    assert column(read(page), "inputs", "name") == ["<i>.toml"]
 
 
-def test_many_placements_go_into_several_tables():
+def test_many_placements_go_into_several_tables_of_the_text_and_one_of_the_page():
     first = document()["placement"][0]
     found = reduce_triplet(measurement(placement=[first] * 8))
     text = text_sheet(found, "a")
     assert [f"no. {k}" in text for k in (1, 8, 9)] == [True, True, False]
-    page = Text(html_sheet(found, "a", datetime(2026, 11, 21, tzinfo=UTC), "00"))
-    assert [f"no. {k}" in page.words for k in (1, 8, 9)] == [True, True, False]
+    labels = [c["label"] for c in read(page_of(found))["tables"]["ranges"]["columns"]]
+    assert labels == ["symbol", "description", "design value", *(f"no. {k}" for k in range(1, 9)), "unit"]
 
 
 def test_a_slip_is_named_at_the_edge_of_the_figure_and_a_refusal_in_the_words():
@@ -204,10 +196,11 @@ def test_unit_without_result_shows_unknown():
     own = document()["placement"][0] | {"d_toppl_mm": 3000.0, "h_s_mm": 1000.0, "phi_1_rad": 0.318, "phi_2_rad": 0.218}
     found = reduce_triplet(measurement(placement=[own], d12_mm=100.0))
     assert found.status == ("no triangle: left out",)
-    text, html = text_sheet(found, "T.toml"), html_sheet(found, "T.toml", datetime.now(UTC), "0" * 64)
+    text, page = text_sheet(found, "T.toml"), page_of(found, "T.toml")
     assert "H_corr      unknown, u –" in text
     assert not re.search(r"\bnan\b", text)
-    assert not re.search(r"[+>]nan\b", html)
+    assert not re.search(r"\bnan\b", " ".join(words_of(page)))
+    assert read(page)["charts"]["placements"]["x"]["values"] == []
     assert not found.accepted
 
 

@@ -1,16 +1,15 @@
-"""Figures of acoustic paths as SVG text: recordings, correlations, temperature over time."""
+"""Figures of acoustic paths: recordings, correlations, temperature over time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled, svgs
+from catseye.gateways.air.charts import DIRECTIONS
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled
 
 if TYPE_CHECKING:
     from catseye.reduction.air.sound_path import AcousticPath, ChannelTrace
-
-DIRECTIONS = {"ab": "towards the target", "ba": "towards the ranger", "loop": "loop-back"}
 
 
 def acoustic_drawings(path: "AcousticPath") -> dict[str, Figure]:
@@ -23,11 +22,6 @@ def acoustic_drawings(path: "AcousticPath") -> dict[str, Figure]:
         if path.used.any():
             drawn["temperature"] = _in_time(path)
         return drawn
-
-
-def acoustic_figures(path: "AcousticPath") -> dict[str, str]:
-    """SVG text of each figure of one path, by name."""
-    return svgs(acoustic_drawings(path))
 
 
 def _recording(traces: Sequence["ChannelTrace"]) -> Figure:

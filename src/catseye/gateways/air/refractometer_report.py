@@ -1,28 +1,27 @@
-"""Refractometer path as JSON, text, table, figure and page."""
+"""Refractometer path as JSON, text, table and report."""
 
 from collections import Counter
 from collections.abc import Callable
 from datetime import UTC, datetime
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from catseye.constants import PPM, TWO_PI
+from catseye.gateways.air.charts import refractometer_charts
 from catseye.gateways.air.tables import series_csv
-from catseye.gateways.writers.objects import json_page, versions
-from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import verdict_line
+from catseye.gateways.writers.report import Card, ReportSection, ResultReport, TableBlock, Text, origin_section
+from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS
 from catseye.signal.cycles.whole import CycleStatus
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from catseye.reduction.air.refractometer_calibration import PathCalibration
 
 FORMAT = "catseye-refractometer-1"
@@ -163,123 +162,55 @@ def _length(calibration: "PathCalibration") -> str:
     )
 
 
-def refractometer_figures(calibration: "PathCalibration") -> "dict[str, Figure]":
-    """Figures of the night with residuals, and phase against weather."""
-    from catseye.gateways.writers.drawing import styled  # matplotlib is heavy
-
-    with styled():
-        return {"night": _night(calibration), "slope": _line(calibration)}
-
-
-def _svgs(calibration: "PathCalibration") -> dict[str, str]:
-    from catseye.gateways.writers.drawing import svgs  # matplotlib is heavy
-
-    return svgs(refractometer_figures(calibration))
-
-
-def _night(calibration: "PathCalibration"):
-    from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure
-
-    hours, good = calibration.readings.hours, np.isfinite(calibration.refractivity)
-    used = np.array([s == "good" for s in calibration.status])
-    off = np.array([s == "weather off" for s in calibration.status])
-    figure = Figure(figsize=(9.4, 6.4), layout="constrained")
-    index, residual, warm = figure.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": (3, 2, 2)})
-    index.scatter(hours, calibration.weather.mean / PPM, s=5, c=SERIES[1], lw=0, alpha=0.6, label="from weather")
-    path = np.where(good, calibration.refractivity, np.nan) / PPM
-    gaps = np.flatnonzero(np.diff(hours) > 10.0 * np.median(np.diff(hours))) + 1
-    lines = [np.insert(v, gaps, np.nan) for v in (hours, path, calibration.temperature_c, calibration.u_temperature_c)]
-    index.plot(lines[0], lines[1], color=SERIES[0], lw=1.2, label="from phase")
-    for row in np.flatnonzero([s == "stray" for s in calibration.status]):
-        index.axvline(hours[row], color=BAD, lw=0.6, ls=":", alpha=0.6)
-    low, high = np.nanpercentile(path, [0, 100])
-    index.set_ylim(low - 0.25 * (high - low) - 0.2, high + 0.25 * (high - low) + 0.2)
-    index.set_ylabel("n_g − 1 (ppm)")
-    index.set_title(f"{calibration.readings.sheet.path}: group index of the path (dotted: stray phases)")
-    residual.axhline(0.0, color=FAINT, lw=0.8)
-    residual.scatter(hours[used], calibration.residual[used] / PPM, s=5, c=INK, lw=0, alpha=0.7, label="used")
-    residual.scatter(hours[off], calibration.residual[off] / PPM, s=14, c=BAD, marker="x", lw=0.8, label="excluded")
-    spread = 6.0 * float(np.nanstd(calibration.residual[used])) / PPM
-    residual.set_ylim(-spread, spread)
-    residual.set_ylabel("weather − path (ppm)")
-    when, _, t, u = lines
-    warm.fill_between(when, t - u, t + u, color=SERIES[0], alpha=0.25, lw=0, label="± u")
-    warm.plot(when, t, color=SERIES[0], lw=1.0, label="path mean")
-    warm.set_ylabel("°C")
-    warm.set_xlabel(f"hours since MJD {calibration.readings.mjd_utc[0]:.4f} UTC")
-    for ax in (index, residual, warm):
-        for s in calibration.followed.sections[1:]:
-            ax.axvline(hours[s.first], color=BAD, lw=1.0)
-        ax.legend(loc="best", ncols=2)
-    return figure
-
-
-def _line(calibration: "PathCalibration"):
-    from catseye.gateways.writers.drawing import INK, SERIES, Figure
-
+def refractometer_report(calibration: "PathCalibration", when: datetime) -> ResultReport:
+    """Report of a refractometer path; `when` is UTC."""
     sheet = calibration.readings.sheet
-    slope = float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz))
-    figure = Figure(figsize=(9.4, 4.2), layout="constrained")
-    ax = figure.add_subplot()
-    used = np.array([s == "good" for s in calibration.status])
-    drift = (calibration.refractivity - calibration.index_0) * slope  # phase without drift and jumps
-    weather = calibration.refractivity + calibration.residual  # from the thermometers in use
-    ax.scatter(weather[used] / PPM, drift[used], s=8, c=SERIES[0], lw=0, alpha=0.6, label="readings")
-    ends = np.array([np.nanmin(weather[used]), np.nanmax(weather[used])])
-    ax.plot(ends / PPM, (ends - calibration.index_0) * slope, color=INK, lw=1.1, label="theory: −(4πf/c) L")
-    ax.set_xlabel("n_g − 1 from weather (ppm)")
-    ax.set_ylabel("phase relative to the reference phase (rad)")
-    ax.set_title("Phase against weather: the phase falls as the index rises")
-    ax.legend(loc="best")
-    return figure
-
-
-def refractometer_report(calibration: "PathCalibration", when: datetime) -> str:
-    """HTML report; `when` is UTC."""
-    drawn, sheet = _svgs(calibration), calibration.readings.sheet
-    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages(calibration))
-    cards = [
-        card(
-            "n_g − 1",
-            f"{calibration.index_0 / PPM:.3f} ± {calibration.u_index_0 / PPM:.3f} ppm",
-            "at the reference phase",
-        ),
-        card("Weather over phase", _card_slope(calibration), "1: the path's air changes as at the sensors"),
-        card(
-            "Readings", f"{calibration.status.count('good')} of {len(calibration.readings)}", "used in the calibration"
-        ),
-    ]
-    thermometers = [(n, f"{v:+.3f}", f"{u:.3f}") for n, (v, u) in calibration.thermometers.items()]
-    facts = [*versions().items(), *((k, str(v)) for k, v in sheet.model_dump(exclude_none=True).items())]
-    body = [
-        f"<header><h1>{escape(sheet.path)}: refractometer</h1><div class='faint'>calibrated by catseye on "
-        f"{when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div></header>",
-        verdict_line(calibration.verdict),
-        section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
-        section(
-            "night",
-            "The night",
-            picture(drawn["night"], "Index of the path from phase and from weather; their difference; and the mean "
-                    "temperature equivalent to the index at the measured pressure and humidity. Red lines: a jump, "
-                    "or a gap after which the whole cycles are unknown."),
-            picture(drawn["slope"], "The theoretical slope is not fitted: readings along it show that the path's air "
-                    "changes as the air at the sensors."),
-        ),
-        section(
-            "budget",
-            "Budget",
-            paragraph("Standard uncertainty of the calibrated index by cause; causes add in quadrature."),
-            table(("cause", "ppm"), [(c, f"{p / PPM:.4f}") for c, p in calibration.budget.items()], "tn"),
-            table(("thermometer", "reads too high (°C)", "u (°C)"), thermometers, "tnn"),
-        ),
-        section(
-            "provenance",
-            "Provenance",
-            table(("file read", "SHA-256"), list(calibration.readings.hashes.items()), "th"),
-            table(("item", "value"), facts, "tt"),
-        ),
-    ]  # fmt: skip
-    return page("catseye: refractometer", "\n".join(body))
+    good = f"{calibration.status.count('good')} of {len(calibration.readings)}"
+    index = f"{calibration.index_0 / PPM:.3f} ± {calibration.u_index_0 / PPM:.3f} ppm"
+    causes = [(cause, part / PPM) for cause, part in calibration.budget.items()]
+    thermometers = [(name, v, u) for name, (v, u) in calibration.thermometers.items()]
+    return ResultReport(
+        title=f"{sheet.path}: refractometer",
+        subtitle=f"calibrated by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ",
+        verdict=calibration.verdict,
+        cards=[
+            Card("n_g − 1", index, "at the reference phase"),
+            Card("Weather over phase", _card_slope(calibration), "1: the path's air changes as at the sensors"),
+            Card("Readings", good, "used in the calibration"),
+        ],
+        passages=passages(calibration),
+        sections=[
+            ReportSection("night", "The night", refractometer_charts(calibration)),
+            ReportSection(
+                "budget",
+                "Budget",
+                [
+                    Text("Standard uncertainty of the calibrated index by cause; causes add in quadrature."),
+                    TableBlock(
+                        "budget",
+                        ReportTable.of_rows(
+                            causes, text("cause", "cause"), uncertainty("u", "u", unit="ppm", digits=4)
+                        ),
+                    ),
+                    TableBlock(
+                        "thermometers",
+                        ReportTable.of_rows(
+                            thermometers,
+                            text("thermometer", "thermometer"),
+                            number("offset", "reads too high", unit="°C", digits=3, u="u"),
+                            uncertainty("u", "u", unit="°C", digits=3),
+                        ),
+                    ),
+                ],
+            ),
+            origin_section(
+                when,
+                calibration.readings.hashes,
+                {key: str(value) for key, value in sheet.model_dump(exclude_none=True).items()},
+            ),
+        ],
+        label="catseye: refractometer",
+    )
 
 
 def _card_slope(calibration: "PathCalibration") -> str:
@@ -296,12 +227,14 @@ def write_refractometer(
     directory     existing, from `writers.output.atomic_directory`
     progress      called for each file
     """
+    from catseye.gateways.air.refractometer_figures import night_svg  # matplotlib is heavy
+
     when = datetime.now(UTC)
     files: Files = {
         "group_index.csv": lambda: series_csv(calibration),
         "refractometer.json": lambda: json_page(refractometer_object(calibration)),
-        "night.svg": lambda: _svgs(calibration)["night"],
-        "report.html": lambda: refractometer_report(calibration, when),
+        "night.svg": lambda: night_svg(calibration),
+        "report.html": lambda: report_page(refractometer_report(calibration, when)),
     }
     sheet = calibration.readings.sheet.model_dump(mode="json", exclude_none=True)
     provenance = {"format": FORMAT, "made_by": "catseye refractometer", "sheet": sheet}

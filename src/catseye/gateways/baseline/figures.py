@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.constants import MILLIMETRE, PPM, TWO_PI
+from catseye.constants import MILLIMETRE, PPM
+from catseye.gateways.baseline.report_charts import cyclic_error
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, styled
 
 if TYPE_CHECKING:
@@ -124,18 +125,11 @@ def _cyclic(calibration: "BaselineCalibration") -> Figure:
     shots = calibration.observations
     angle = np.linspace(0.0, 1.0, 201)
 
-    def curve(share):
-        total = np.zeros_like(share)
-        for order in range(1, len(calibration.cyclic) // 2 + 1):
-            for name, wave in (("cosine", np.cos), ("sine", np.sin)):
-                total = total + calibration.solution.of(f"cyclic {name} {order}")[0] * wave(TWO_PI * order * share)
-        return total
-
     share = shots.slope / unit % 1.0
     figure = Figure(figsize=(9.4, 3.6), layout="constrained")
     ax = figure.add_subplot()
-    ax.plot(angle * unit, curve(angle) / MILLIMETRE, color=INK, lw=1.2, label="adjusted")
-    values = (calibration.shot_residuals + curve(share)) / MILLIMETRE
+    ax.plot(angle * unit, cyclic_error(calibration, angle) / MILLIMETRE, color=INK, lw=1.2, label="adjusted")
+    values = (calibration.shot_residuals + cyclic_error(calibration, share)) / MILLIMETRE
     for k, label, colour, marker in _setups(calibration):
         mine = shots.setup == k
         ax.scatter(share[mine] * unit, values[mine], s=18, c=colour, marker=marker, lw=0, alpha=0.75, label=label)

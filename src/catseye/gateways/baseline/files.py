@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 from catseye.aliases import Progress
 from catseye.gateways.baseline.objects import baseline_object
+from catseye.gateways.baseline.report import baseline_report
 from catseye.gateways.baseline.tables import distances_csv, observations_csv, pillars_csv
 from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.report_page import report_page
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.laboratory.baseline import FORMAT, Baseline, baseline_text
 from catseye.reduction.baseline.instrument import record_values
@@ -30,15 +32,13 @@ def write_calibration(
     inputs        SHA-256 of each input file, by name
     progress      called for each file
     """
-    from catseye.gateways.baseline.report import baseline_report  # matplotlib is heavy
-
     when = datetime.now(UTC)
     files: Files = {
         "pillars.csv": lambda: pillars_csv(calibration),
         "distances.csv": lambda: distances_csv(calibration),
         "observations.csv": lambda: observations_csv(calibration),
         "baseline.json": lambda: json_page(baseline_object(calibration)),
-        "report.html": lambda: baseline_report(calibration, when, inputs),
+        "report.html": lambda: report_page(baseline_report(calibration, when, inputs)),
     }
     provenance = {"format": FORMAT, "made_by": "catseye baseline", "settings": asdict(calibration.settings)}
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)

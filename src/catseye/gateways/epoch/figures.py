@@ -113,11 +113,6 @@ def _rows(reduction: Reduction) -> list[int]:
     return [row for row, kind in enumerate(kinds_of(reduction).values()) if kind != "fixed point"]
 
 
-def crowded(reduction: Reduction) -> bool:
-    """True where plan and elevation draw the prisms as dots, without ellipsoids."""
-    return len(_rows(reduction)) > CROWD
-
-
 def _plan(reduction: Reduction) -> Figure:
     figure = Figure(figsize=(9.4, 8.6), layout="constrained")
     ax = figure.add_subplot()

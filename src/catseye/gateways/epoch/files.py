@@ -9,10 +9,11 @@ import numpy as np
 
 from catseye.aliases import Progress
 from catseye.gateways.epoch.objects import COVARIANCE, coordinates_object, matrix_file, pose_object, provenance_object
-from catseye.gateways.epoch.report import report
+from catseye.gateways.epoch.report import reduction_report
 from catseye.gateways.epoch.tables import coordinates_csv, ranges_csv, surface_csv
 from catseye.gateways.writers.matrix_fits import matrix_pages
 from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.report_page import report_page
 from catseye.gateways.writers.written import Files, write_files
 from catseye.reduction.epoch.epoch import Reduction
 
@@ -45,6 +46,6 @@ def write_reduction(reduction: Reduction, directory: Path, progress: Progress | 
         "coordinates.json": lambda: json_page(coordinates_object(reduction)),
         **({COVARIANCE: lambda: _covariance(cached())} if separate else {}),
         "pose.json": lambda: json_page(pose_object(reduction)),
-        "report.html": lambda: report(cached(), when, progress),
+        "report.html": lambda: report_page(reduction_report(cached(), when, progress)),
     }
     write_files(files, directory, provenance_object(reduction, when), progress=progress)

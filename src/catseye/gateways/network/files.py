@@ -10,10 +10,13 @@ from typing import Any
 from catseye.aliases import Progress
 from catseye.gateways.network.comparison import FORMAT as COMPARISON
 from catseye.gateways.network.comparison import comparison_object
+from catseye.gateways.network.comparison_report import comparison_report
 from catseye.gateways.network.objects import FORMAT, network_json
+from catseye.gateways.network.report import network_report
 from catseye.gateways.network.tables import coordinates_csv, displacements_csv, observations_csv, parameters_csv
 from catseye.gateways.network.xml import network_xml
 from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.report_page import report_page
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.network.adjusted import AdjustedNetwork
 from catseye.reduction.network.comparison import ComparedEpochs
@@ -62,13 +65,11 @@ def write_comparison(
     inputs      SHA-256 of each input file, by name
     progress    called for each file
     """
-    from catseye.gateways.network.comparison_report import comparison_report
-
     when = datetime.now(UTC)
     files: Files = {
         "displacements.csv": lambda: displacements_csv(compared),
         "comparison.json": lambda: [json_page(comparison_object(compared))],
-        "report.html": lambda: [comparison_report(compared, when, inputs)],
+        "report.html": lambda: report_page(comparison_report(compared, when, inputs)),
         **_files(replace(compared.first, treatment=None), when, inputs, prefix="epoch-1-"),
         **_files(replace(compared.second, treatment=None), when, inputs, prefix="epoch-2-"),
     }
@@ -95,14 +96,12 @@ def _files(
     *,
     prefix: str = "",
 ) -> Files:
-    from catseye.gateways.network.report import network_report  # matplotlib is heavy
-
     files: Files = {
         "coordinates.csv": lambda: coordinates_csv(adjusted),
         "observations.csv": lambda: observations_csv(adjusted),
         "parameters.csv": lambda: parameters_csv(adjusted),
         "adjustment.json": lambda: network_json(adjusted, lines=True),
         "adjustment.xml": lambda: network_xml(adjusted),
-        "report.html": lambda: [network_report(adjusted, when, inputs, prefix=prefix)],
+        "report.html": lambda: report_page(network_report(adjusted, when, inputs, prefix=prefix)),
     }
     return {prefix + name: pieces for name, pieces in files.items()}

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -13,27 +12,20 @@ from catseye.constants import MILLIMETRE
 from catseye.estimation.network.monte_carlo import MonteCarloScatter
 from catseye.estimation.network.plan import Candidate
 from catseye.gateways.network.objects import network_object
+from catseye.gateways.network.report import MOST_OBSERVATIONS, provenance_section
+from catseye.gateways.network.report_charts import network_view, redundancy_chart
 from catseye.gateways.network.summary import direction_words
 from catseye.gateways.network.tables import candidates_csv, coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
-from catseye.gateways.writers.page import card, page, paragraph, section, table
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import verdict_line
+from catseye.gateways.writers.report import Block, Card, Heading, ReportSection, ResultReport, TableBlock, Text
+from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.network.plan import PlannedNetwork
 from catseye.reduction.network.words import quantity
 
 FORMAT = "catseye-plan-1"
-LISTED = 10  # weakest points and most important observations in text and report
-CONTENTS = {
-    "summary": "Summary",
-    "network": "Network",
-    "weakest": "Weakest points",
-    "next": "Next observations",
-    "observations": "Worth of each observation",
-    "paper": "Monte Carlo",
-    "provenance": "Provenance",
-}
 
 
 def plan_object(planned: PlannedNetwork) -> dict[str, Any]:
@@ -164,125 +156,116 @@ def scatter_words(s: MonteCarloScatter) -> str:
     return text
 
 
-def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, str]) -> str:
-    """HTML report of a planned network."""
-    from catseye.gateways.network.figures import network_figures
-    from catseye.gateways.network.report import provenance_section, view_pictures
-
+def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
+    """Report of a planned network."""
     predicted, plan = planned.predicted, planned.plan
-    drawn = network_figures(predicted)
     name = predicted.network.source or "network"
-    links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in CONTENTS.items())
-    header = (
-        f"<header><h1>{escape(name)}: plan of a network</h1>"
-        f'<div class="faint">{len(predicted.table)} observations of {len(predicted.names)} points, predicted by '
-        f"catseye on {when:%Y-%m-%d %H:%M} UTC; nothing here was measured. u = standard uncertainty, 1σ</div>"
-        f"<nav>{links}</nav></header>"
+    settings = {"candidates listed": str(len(plan.candidates))}
+    following: list[Block] = (
+        [_ranges("candidates", plan.candidates)] if plan.candidates else [Text("No ranges to add.")]
     )
-    words = "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in plan_passages(planned))
-    following = _ranges(plan.candidates) if plan.candidates else paragraph("No ranges to add.")
-    scheduled = (
-        "<h3>Schedule in the given time</h3>" + _ranges(planned.picked, scheduled=True) if planned.picked else ""
-    )
-    scatter = (
-        paragraph(scatter_words(planned.scatter)[0].upper() + scatter_words(planned.scatter)[1:])
-        if planned.scatter
-        else ""
-    )
-    body = [
-        header,
-        verdict_line(planned.verdict),
-        section(
-            "summary",
-            CONTENTS["summary"],
-            f'<div class="cards">{"".join(_cards(planned))}</div>',
-            f"<dl>{words}</dl>",
+    if planned.picked:
+        schedule = _ranges("schedule", planned.picked, scheduled=True)
+        following += [Heading("Schedule in the given time"), schedule]
+    words = "" if planned.scatter is None else scatter_words(planned.scatter)
+    return ResultReport(
+        title=f"{name}: plan of a network",
+        subtitle=(
+            f"{len(predicted.table)} observations of {len(predicted.names)} points, predicted by catseye on "
+            f"{when:%Y-%m-%d %H:%M} UTC; nothing here was measured. u = standard uncertainty, 1σ"
         ),
-        section("network", CONTENTS["network"], *view_pictures(drawn)),
-        section("weakest", CONTENTS["weakest"], _weakest(planned)),
-        section(
-            "next",
-            CONTENTS["next"],
-            paragraph(
-                "Each additional range alone, the best first, with the resulting mean standard uncertainty. "
-                "Visibility is unknown here: a pair may be obstructed."
+        verdict=planned.verdict,
+        cards=_cards(planned),
+        passages=plan_passages(planned),
+        sections=[
+            ReportSection("network", "Network", [network_view(predicted, predicted=True), redundancy_chart(predicted)]),
+            ReportSection("weakest", "Weakest points", [TableBlock("weakest", _weakest(planned))]),
+            ReportSection(
+                "next",
+                "Next observations",
+                [
+                    Text(
+                        "Each additional range alone, the best first, with the resulting mean standard uncertainty. "
+                        "Visibility is unknown here: a pair may be obstructed."
+                    ),
+                    *following,
+                ],
             ),
-            following,
-            scheduled,
-        ),
-        section(
-            "observations",
-            CONTENTS["observations"],
-            paragraph("Worth: increase of the mean standard uncertainty without the observation."),
-            _worth(planned),
-        ),
-        section("paper", CONTENTS["paper"], scatter or paragraph("Not requested.", "faint")),
-        provenance_section(when, inputs, {"candidates listed": str(len(plan.candidates))}),
-    ]
-    return page(f"catseye plan: {name}", "\n".join(body))
+            ReportSection(
+                "observations",
+                "Worth of each observation",
+                [
+                    Text("Worth: increase of the mean standard uncertainty without the observation."),
+                    TableBlock("worth", _worth(planned)),
+                ],
+            ),
+            ReportSection(
+                "monte-carlo", "Monte Carlo", [Text(words[:1].upper() + words[1:] if words else "Not requested.")]
+            ),
+            provenance_section(when, inputs, settings),
+        ],
+        label=f"catseye plan: {name}",
+    )
 
 
-def _cards(planned: PlannedNetwork) -> list[str]:
+def _cards(planned: PlannedNetwork) -> list[Card]:
     predicted, plan = planned.predicted, planned.plan
     return [
-        card("Coordinate uncertainty", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
-        card(
+        Card("Coordinate uncertainty", quantity(plan.mean_u, "m"), "root mean square over the points of interest"),
+        Card(
             "Weakest point",
             predicted.names[planned.weakest[0]] if len(planned.weakest) else "none",
             f"{quantity(float(plan.weakest.max(initial=0.0)), 'm')} along its longest axis",
         ),
-        card("Indispensable", str(int(np.isinf(planned.worth).sum())), "losing one leaves a point undetermined"),
-        card("Unchecked", str(int(np.sum(~predicted.table.checked))), "observations whose error would not show"),
+        Card("Indispensable", str(int(np.isinf(planned.worth).sum())), "losing one leaves a point undetermined"),
+        Card("Unchecked", str(int(np.sum(~predicted.table.checked))), "observations whose error would not show"),
     ]
 
 
-def _weakest(planned: PlannedNetwork) -> str:
-    predicted, plan = planned.predicted, planned.plan
-    return table(
-        ("point", "longest axis (mm)", "towards"),
-        [
-            (predicted.names[i], f"{plan.weakest[i] / MILLIMETRE:.4f}", direction_words(predicted, int(i)))
-            for i in planned.weakest[: 5 * LISTED]
-        ],
-        "tnt",
-    )
-
-
-def _worth(planned: PlannedNetwork) -> str:
-    """Table of the observations' worth, the largest first."""
-    predicted = planned.predicted
-    order = np.argsort(-planned.worth, kind="stable")[: 5 * LISTED]
-    return table(
-        ("observation", "worth (µm)", "redundancy", "detectable"),
-        [
-            (
-                predicted.label(int(k)),
-                "∞" if np.isinf(planned.worth[k]) else f"{planned.worth[k] * 1e6:.4f}",
-                f"{predicted.table.redundancy[k]:.3f}",
-                quantity(predicted.table.mdb[k], str(predicted.table.unit[k]))
-                if np.isfinite(predicted.table.mdb[k])
-                else "never",
-            )
-            for k in order
-        ],
-        "tnnn",
-    )
-
-
-def _ranges(rows: tuple[Candidate, ...], *, scheduled: bool = False) -> str:
-    columns = ("from", "to", "u (mm)", "resulting mean u (mm)", "gain (µm)", *(("done at (s)",) if scheduled else ()))
-    lines = [
+def _weakest(planned: PlannedNetwork) -> ReportTable:
+    predicted, rows = planned.predicted, planned.weakest
+    return ReportTable(
         (
-            c.from_,
-            c.to,
-            f"{c.u / MILLIMETRE:.4f}",
-            f"{c.mean_u / MILLIMETRE:.5f}",
-            f"{c.gain * 1e6:.4f}",
-            *((f"{c.at_s:g}",) if scheduled else ()),
-        )
-        for c in rows
+            text("point", "point", [predicted.names[i] for i in rows]),
+            uncertainty("u", "longest axis", planned.plan.weakest[rows] / MILLIMETRE, "mm", 4),
+            text("towards", "towards", [direction_words(predicted, int(i)) for i in rows]),
+        ),
+        "point",
+    )
+
+
+def _worth(planned: PlannedNetwork) -> ReportTable:
+    """Table of the observations' worth, the largest first."""
+    table = planned.predicted.table
+    order = np.argsort(-planned.worth, kind="stable")[:MOST_OBSERVATIONS]
+    needed = np.isinf(planned.worth[order])
+    detectable = [
+        quantity(table.mdb[k], str(table.unit[k])) if np.isfinite(table.mdb[k]) else "never" for k in order.tolist()
     ]
-    return table(columns, lines, "ttnnn" + ("n" if scheduled else ""))
+    return ReportTable(
+        (
+            text("observation", "observation", [planned.predicted.label(int(k)) for k in order]),
+            number("worth", "worth", np.where(needed, np.nan, planned.worth[order] * 1e6), "µm", 4),
+            text("remark", "remark", np.where(needed, "indispensable", "")),
+            number("redundancy", "redundancy", table.redundancy[order], digits=3),
+            text("detectable", "detectable", detectable),
+        ),
+        "observation",
+    )
+
+
+def _ranges(key: str, rows: tuple[Candidate, ...], *, scheduled: bool = False) -> TableBlock:
+    heads = (
+        text("from", "from"),
+        text("to", "to"),
+        uncertainty("u", "u", unit="mm", digits=4),
+        uncertainty("mean_u", "resulting mean u", unit="mm", digits=5),
+        number("gain", "gain", unit="µm", digits=4),
+        number("at", "done at", unit="s"),
+    )
+    lines = [(c.from_, c.to, c.u / MILLIMETRE, c.mean_u / MILLIMETRE, c.gain * 1e6, c.at_s) for c in rows]
+    table = ReportTable.of_rows(lines, *heads)
+    return TableBlock(key, table if scheduled else ReportTable(table.columns[:-1]))
 
 
 def write_plan(
@@ -295,7 +278,7 @@ def write_plan(
     """Write report, tables and JSON of a plan, and last the provenance with their hashes."""
     when = datetime.now(UTC)
     files: Files = {
-        "report.html": lambda: plan_report(planned, when, inputs),
+        "report.html": lambda: report_page(plan_report(planned, when, inputs)),
         "points.csv": lambda: "".join(coordinates_csv(planned.predicted)),
         "candidates.csv": lambda: "".join(candidates_csv(planned.plan.candidates, planned.picked)),
         "plan.json": lambda: json_page(plan_object(planned)),

@@ -1,28 +1,28 @@
 """Files of a pose: pose.json, points.csv, report.html, provenance.json."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from html import escape
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.estimation.shapes.pose import Pose
-from catseye.gateways.pose.objects import (
-    beam_rows,
-    pose_result_object,
-    pose_rows,
-    pose_words,
-)
+from catseye.estimation.shapes.pose import COMPONENTS, Pose
+from catseye.gateways.pose.charts import pose_blocks, residual_table, terms_charts
+from catseye.gateways.pose.objects import pose_result_object, pose_words
 from catseye.gateways.pose.tables import POINTS, points_csv
-from catseye.gateways.writers.objects import json_page, versions
-from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.objects import json_page
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.report import Block, Card, ReportSection, ResultReport, TableBlock, Text, origin_section
+from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
-from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.network.written_pose import GROUP_POSE
 from catseye.reduction.pose.findings import PoseFindings
+from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
 from catseye.reduction.pose.pointing_offsets import PointingOffset
 
 
@@ -46,7 +46,7 @@ def write_pose(
     files: Files = {
         "points.csv": lambda: points_csv(result),
         "pose.json": lambda: json_page(pose_result_object(result)),
-        "report.html": lambda: pose_report(result, when, inputs),
+        "report.html": lambda: report_page(pose_report(result, when, inputs)),
     }
     provenance = {"format": GROUP_POSE, "made_by": "catseye pose", "settings": dict(settings)}
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
@@ -66,73 +66,73 @@ def write_pose(
     join_tables(directory, [POINTS], frame=pose.frame, pivot=pivot, tables={"POSE": six})
 
 
-def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> str:
-    """Complete HTML report of a pose."""
-    from catseye.gateways.pose.figures import pose_figures  # matplotlib is heavy
-    from catseye.gateways.writers.drawing import svgs
-
-    drawn = svgs(pose_figures(result))
+def pose_report(result: PoseFindings, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
+    """Report of a pose; `when` is UTC."""
     group = result.pose
-    title = f"Pose of {group.group} in {group.epoch.campaign or 'an epoch'}, against {group.against}"
-    header = (
-        f"<header><h1>{escape(title)}</h1>"
-        f'<div class="faint">fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; second = '
-        f"pivot + translation + rotation (first − pivot), rotations right-handed</div></header>"
-    )
-    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in pose_words(result))
-    body = [
-        header,
-        verdict_line(result.verdict),
-        section("summary", "Summary", f'<div class="cards">{"".join(_cards(group.pose))}</div>', f"<dl>{words}</dl>"),
-        section(
-            "pose",
-            "Six degrees of freedom",
-            table(("component", "value", "u", "unit"), pose_rows(result), "tnnt"),
-            paragraph("The full covariance is in pose.json; it transforms exactly to another pivot or frame."),
+    return ResultReport(
+        title=f"Pose of {group.group} in {group.epoch.campaign or 'an epoch'}, against {group.against}",
+        subtitle=(
+            f"fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ; second = pivot + "
+            "translation + rotation (first − pivot), rotations right-handed"
         ),
-        section(
-            "residuals",
-            "Residuals",
-            picture(
-                drawn["residuals"],
-                "Residuals of the points: second position minus first position moved by the pose. Arrows lie in "
-                "the plane of the drawing; the colour is the component across it.",
+        verdict=result.verdict,
+        cards=_cards(group.pose),
+        passages=[Passage(title, words) for title, words in pose_words(result)],
+        sections=[
+            ReportSection(
+                "pose",
+                "Six degrees of freedom",
+                [
+                    TableBlock("pose", _components(COMPONENTS, *_six(group.pose))),
+                    Text("The full covariance is in pose.json; it transforms exactly to another pivot or frame."),
+                ],
             ),
-        ),
-    ]
-    if result.beam is not None:
-        body.append(_beam_section(result.beam, drawn["terms"]))
-    facts = [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()]
-    body.append(
-        section(
-            "provenance",
-            "Provenance",
-            table(("file read", "SHA-256"), list(inputs.items()), "th"),
-            table(("item", "value"), facts, "tt"),
+            ReportSection(
+                "residuals", "Residuals", [*pose_blocks(result), TableBlock("residuals", residual_table(result))]
+            ),
+            None if result.beam is None else ReportSection("pointing", "Beam and focus", _beam(result.beam)),
+            origin_section(when, inputs),
+        ],
+        label=f"catseye: pose of {group.group}",
+    )
+
+
+def _six(pose: Pose) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Values, uncertainties and units of a pose."""
+    scale = np.repeat([MILLIMETRE, ARCSECOND], 3)
+    return np.concatenate([pose.translation, pose.rotation]) / scale, pose.u / scale, ["mm"] * 3 + ["″"] * 3
+
+
+def _components(names: Sequence[str], values: np.ndarray, u: np.ndarray, units: Sequence[str]) -> ReportTable:
+    return ReportTable(
+        (
+            text("component", "component", names),
+            number("value", "value", values, digits=3, u="u"),
+            uncertainty("u", "u", u, digits=3),
+            text("unit", "unit", units),
         )
     )
-    return page(f"catseye: {title}", "\n".join(body))
 
 
-def _cards(pose: Pose) -> list[str]:
+def _cards(pose: Pose) -> list[Card]:
     return [
-        card(f"{'xyz'[k]}", f"{pose.translation[k] / MILLIMETRE:+.3f} mm", f"u = {pose.u[k] / MILLIMETRE:.3f} mm")
+        Card(f"{'xyz'[k]}", f"{pose.translation[k] / MILLIMETRE:+.3f} mm", f"u = {pose.u[k] / MILLIMETRE:.3f} mm")
         for k in range(3)
     ] + [
-        card(f"about {'xyz'[k]}", f"{pose.rotation[k] / ARCSECOND:+.2f}″", f"u = {pose.u[3 + k] / ARCSECOND:.2f}″")
+        Card(f"about {'xyz'[k]}", f"{pose.rotation[k] / ARCSECOND:+.2f}″", f"u = {pose.u[3 + k] / ARCSECOND:.2f}″")
         for k in range(3)
     ]
 
 
-def _beam_section(beam: PointingOffset, figure: str) -> str:
-    terms = [
-        (name, *(f"{part[k] / (ARCSECOND if k < 2 else MILLIMETRE):+.3f}" for k in range(3)))
-        for name, part in beam.terms.items()
-    ]
-    return section(
-        "pointing",
-        "Beam and focus",
-        table(("component", "value", "u", "unit"), beam_rows(beam), "tnnt"),
-        picture(figure, "Terms of the pointing offset; a correction is its opposite."),
-        table(("term", "azimuth × cos E (″)", "elevation (″)", "focus (mm)"), terms, "tnnn"),
+def _beam(beam: PointingOffset) -> list[Block]:
+    scale = np.array([ARCSECOND, ARCSECOND, MILLIMETRE])
+    u = np.sqrt(np.maximum(np.diag(beam.covariance), 0.0))
+    terms = ReportTable.of_rows(
+        [(name, *(np.asarray(part)[:3] / scale)) for name, part in beam.terms.items()],
+        text("term", "term"),
+        number("azimuth", "azimuth × cos E", unit="″", digits=3),
+        number("elevation", "elevation", unit="″", digits=3),
+        number("focus", "focus", unit="mm", digits=3),
     )
+    offset = _components(BEAM, np.asarray(beam.offset) / scale, u / scale, ("″", "″", "mm"))
+    return [TableBlock("beam", offset), *terms_charts(beam), TableBlock("terms", terms)]

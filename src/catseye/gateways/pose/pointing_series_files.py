@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +10,23 @@ import numpy as np
 
 from catseye.constants import ARCSECOND
 from catseye.errors import InputError
+from catseye.gateways.pose.charts import correlation_table, fit_charts, track_charts
 from catseye.gateways.pose.pointing_series_objects import (
     FORMAT,
     TRACK,
     fit_object,
-    fit_rows,
     fit_words,
     model_record,
     track_object,
 )
 from catseye.gateways.pose.tables import OBSERVATIONS, TILT, observations_csv, tilt_csv
-from catseye.gateways.writers.objects import json_page, versions
+from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import atomic_file
-from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.report import Card, ReportSection, ResultReport, TableBlock, Text, origin_section
+from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
-from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.files.toml_text import record_toml
 from catseye.records.laboratory.star_offsets import MARK as STARS
@@ -43,7 +44,7 @@ def write_fit(result: PointingFindings, *, directory: Path, settings: Mapping[st
         "observations.csv": lambda: observations_csv(result),
         "pointing.json": lambda: json_page(fit_object(result)),
         "pointing.toml": lambda: record_toml(model_record(fit, f"fit of {result.observations.name}")),
-        "report.html": lambda: fit_report(result, when),
+        "report.html": lambda: report_page(fit_report(result, when)),
     }
     provenance = {"format": FORMAT, "made_by": "catseye pointing fit", "settings": dict(settings)}
     write_files(files, directory, {**provenance, **origin(when, result.hashes)})
@@ -79,59 +80,60 @@ def write_used_stars(result: PointingFindings, path: Path) -> None:
         pieces.append(star_offsets_text(selected))
 
 
-def fit_report(result: PointingFindings, when: datetime) -> str:
-    """HTML report of a pointing fit."""
-    from catseye.gateways.pose.pointing_series_figures import fit_figures  # matplotlib is heavy
-    from catseye.gateways.writers.drawing import svgs
-
+def fit_report(result: PointingFindings, when: datetime) -> ResultReport:
+    """Report of a pointing fit."""
     fit = result.fit
-    drawn = svgs(fit_figures(fit))
-    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in fit_words(result))
     u = np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND
-    cards = [
-        card(term, f"{value:+.2f}″", f"u = {w:.2f}″")
-        for term, value, w in zip(fit.series.terms, fit.series.values / ARCSECOND, u, strict=True)
-    ]
-    heads = ["term", "arcsec", "u"] + (["minus the other", "u"] if result.comparison is not None else [])
-    body = [
-        _header(f"Pointing series from {result.observations.source}", when),
-        verdict_line(fit.verdict),
-        section("summary", "Summary", f'<div class="cards">{"".join(cards)}</div>', f"<dl>{words}</dl>"),
-        section(
-            "terms",
-            "Terms",
-            table(heads, fit_rows(result), "t" + "n" * (len(heads) - 1)),
-            paragraph("ΔA cos E = CA + NPAE sin E + IA cos E + AW cos A sin E + AN sin A sin E;"),
-            paragraph("ΔE = −IE − AW sin A + AN cos A + HZCZ sin E + HZSZ cos E: encoders minus sky."),
-            picture(drawn["correlation"], "Correlations: terms near ±1 cannot be separated by these directions."),
-        ),
-        section(
-            "residuals",
-            "Residuals",
-            picture(drawn["residuals"], "Residuals by azimuth and elevation."),
-            picture(drawn["sky"], "The same on the sky, the zenith in the middle."),
-        ),
-        _provenance(result.hashes, when),
-    ]
-    return page("catseye: pointing", "\n".join(body))
-
-
-def _header(title: str, when: datetime) -> str:
-    return (
-        f"<header><h1>{escape(title)}</h1>"
-        f'<div class="faint">fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ</div>'
-        "</header>"
+    return ResultReport(
+        title=f"Pointing series from {result.observations.source}",
+        subtitle=_subtitle(when),
+        verdict=fit.verdict,
+        cards=[
+            Card(term, f"{value:+.2f}″", f"u = {w:.2f}″")
+            for term, value, w in zip(fit.series.terms, fit.series.values / ARCSECOND, u, strict=True)
+        ],
+        passages=[Passage(title, words) for title, words in fit_words(result)],
+        sections=[
+            ReportSection(
+                "terms",
+                "Terms",
+                [
+                    TableBlock("terms", _terms(result)),
+                    Text("ΔA cos E = CA + NPAE sin E + IA cos E + AW cos A sin E + AN sin A sin E;"),
+                    Text("ΔE = −IE − AW sin A + AN cos A + HZCZ sin E + HZSZ cos E: encoders minus sky."),
+                    Text("Correlations: terms near ±1 cannot be separated by these directions."),
+                    TableBlock("correlations", correlation_table(fit)),
+                ],
+            ),
+            ReportSection("residuals", "Residuals", fit_charts(fit)),
+            origin_section(when, result.hashes),
+        ],
+        label="catseye: pointing",
     )
 
 
-def _provenance(hashes: Mapping[str, str], when: datetime) -> str:
-    facts = [("made (UTC)", f"{when:%Y-%m-%d %H:%M:%S}"), *versions().items()]
-    return section(
-        "provenance",
-        "Provenance",
-        table(("file read", "SHA-256"), list(hashes.items()), "th"),
-        table(("item", "value"), facts, "tt"),
-    )
+def _terms(result: PointingFindings) -> ReportTable:
+    """Term, value and u, and the difference from the other series where compared."""
+    fit, compared = result.fit, result.comparison
+    columns = [
+        text("term", "term", fit.series.terms),
+        number("value", "value", fit.series.values / ARCSECOND, "″", 2, u="u"),
+        uncertainty("u", "u", np.sqrt(np.diag(fit.series.covariance)) / ARCSECOND, "″", 2),
+    ]
+    if compared is not None:
+        place = {term: k for k, term in enumerate(compared.terms)}
+        rows = [place.get(term, -1) for term in fit.series.terms]
+        u = [*np.sqrt(np.maximum(np.diag(compared.covariance), 0.0)) / ARCSECOND, np.nan]
+        apart = [*np.asarray(compared.difference) / ARCSECOND, np.nan]
+        columns += [
+            number("difference", "minus the other", [apart[k] for k in rows], "″", 2, u="u_difference"),
+            uncertainty("u_difference", "u of the difference", [u[k] for k in rows], "″", 2),
+        ]
+    return ReportTable(tuple(columns))
+
+
+def _subtitle(when: datetime) -> str:
+    return f"fitted by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ"
 
 
 def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str]) -> None:
@@ -140,7 +142,7 @@ def write_track(profile: TrackProfile, directory: Path, hashes: Mapping[str, str
     files: Files = {
         "tilt.csv": lambda: tilt_csv(profile),
         "track.json": lambda: json_page(track_object(profile)),
-        "report.html": lambda: track_report(profile, hashes, when),
+        "report.html": lambda: report_page(track_report(profile, hashes, when)),
     }
     settings = {"harmonics": profile.series.harmonics}
     provenance = {"format": TRACK, "made_by": "catseye pointing track", "settings": settings}
@@ -195,27 +197,28 @@ def track_words(profile: TrackProfile) -> list[tuple[str, str]]:
 
 def _tilt_caption(profile: TrackProfile) -> str:
     without = " Without the wave of one turn, which is not determined." if profile.series.undetermined else ""
-    return f"Rotation of the alidade about east and north; dotted: the mean, the axis's tilt.{without}"
+    return f"Rotation of the alidade about east and north; dashed: the mean, the axis's tilt.{without}"
 
 
-def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> str:
-    """HTML report of a track profile."""
-    from catseye.gateways.pose.pointing_series_figures import track_figures  # matplotlib is heavy
-    from catseye.gateways.writers.drawing import svgs
-
-    drawn = svgs(track_figures(profile))
-    words = "".join(f"<dt>{escape(a)}</dt><dd>{escape(b)}</dd>" for a, b in track_words(profile))
-    body = [
-        _header("Track and azimuth bearing", when),
-        verdict_line(profile.verdict),
-        section("summary", "Summary", f"<dl>{words}</dl>"),
-        section(
-            "tilt",
-            "Tilt by azimuth",
-            picture(drawn["tilt"], _tilt_caption(profile)),
-            table(("coefficient", "arcsec", "u"), track_rows(profile), "tnn"),
-            picture(drawn["residuals"], "Residuals of poses and inclinometer."),
-        ),
-        _provenance(hashes, when),
-    ]
-    return page("catseye: track profile", "\n".join(body))
+def track_report(profile: TrackProfile, hashes: Mapping[str, str], when: datetime) -> ResultReport:
+    """Report of a track profile."""
+    names = profile.series.names
+    coefficients = ReportTable(
+        (
+            text("coefficient", "coefficient", names),
+            number("value", "value", profile.series.values / ARCSECOND, "″", 3, u="u"),
+            uncertainty("u", "u", np.sqrt(np.diag(profile.series.covariance)) / ARCSECOND, "″", 3),
+        )
+    )
+    tilt, *residuals = track_charts(profile, _tilt_caption(profile))
+    return ResultReport(
+        title="Track and azimuth bearing",
+        subtitle=_subtitle(when),
+        verdict=profile.verdict,
+        passages=[Passage(title, words) for title, words in track_words(profile)],
+        sections=[
+            ReportSection("tilt", "Tilt by azimuth", [tilt, TableBlock("coefficients", coefficients), *residuals]),
+            origin_section(when, hashes),
+        ],
+        label="catseye: track profile",
+    )

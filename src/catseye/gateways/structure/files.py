@@ -4,11 +4,7 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-
 from catseye.aliases import Progress
-from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.structure.figures import motion_figure, residual_figure, spectrum_figure
 from catseye.gateways.structure.objects import (
     FORMAT,
     structure_object,
@@ -16,12 +12,11 @@ from catseye.gateways.structure.objects import (
     vibration_object,
     vibration_samplers,
 )
+from catseye.gateways.structure.report import structure_report, vibration_report
 from catseye.gateways.structure.tables import coefficients_csv, prediction_csv, residuals_csv, spectra_csv
-from catseye.gateways.writers.drawing import svg
 from catseye.gateways.writers.objects import json_page
-from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
+from catseye.gateways.writers.report_page import report_page
 from catseye.gateways.writers.samplers_fits import SAMPLERS, join_samplers
-from catseye.gateways.writers.verdict import verdict_line
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.structure.findings import StructureFindings
 from catseye.reduction.structure.vibration import Vibration
@@ -42,7 +37,7 @@ def write_structure(
         "coefficients.csv": lambda: coefficients_csv(fit),
         "residuals.csv": lambda: residuals_csv(fit, found.check),
         "structure.json": lambda: json_page({"format": FORMAT, **structure_object(found)}),
-        "report.html": lambda: _structure_page(found),
+        "report.html": lambda: report_page(structure_report(found, when, inputs)),
     }
     if predicted is not None:
         files = {"prediction.csv": lambda: prediction_csv(predicted, found.request), **files}
@@ -68,101 +63,8 @@ def write_vibration(
     files: Files = {
         "spectra.csv": lambda: spectra_csv(vibration),
         "vibration.json": lambda: json_page({"format": FORMAT, **vibration_object(vibration)}),
-        "report.html": lambda: _vibration_page(vibration),
+        "report.html": lambda: report_page(vibration_report(vibration, when, inputs)),
     }
     provenance = {"format": FORMAT, "made_by": "catseye structure --vibration", "start_mjd_utc": zero_mjd}
     write_files(files, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     join_samplers(directory, SAMPLERS, vibration_samplers(vibration, zero_mjd))
-
-
-def _structure_page(found: StructureFindings) -> str:
-    fit, check, predicted, s = found.fit, found.check, found.predicted, found.fit.series
-    cards = [
-        card("Epochs", str(len(s)), f"{len(s.names)} points of {s.group}, frame {s.frame}"),
-        card("Variance factor", f"{fit.fit.variance_factor:.2f}", f"{fit.fit.degrees_of_freedom} degrees of freedom"),
-        card(
-            "Scatter between epochs",
-            f"{1e3 * np.linalg.norm(fit.scatter.u_six[:3]):.2f} mm",
-            f"of the group's shift, and {fit.scatter.u_point * 1e3:.3f} mm of each coordinate: not predictable",
-        ),
-    ]
-    if check is not None:
-        cards.append(card("Epochs left out", f"{check.rms * 1e3:.3f} mm rms", f"{check.ratio:.2f} of the claim"))
-    six, q = fit.six_of()
-    u = np.sqrt(np.maximum(np.diag(q), 0.0)).reshape(-1, 6).T
-    units = np.repeat([MILLIMETRE, ARCSECOND], 3)
-    rows = [
-        [name, *(f"{v:.3f} ± {w:.3f}" for v, w in zip(six[:, k] / units, u[:, k] / units, strict=True))]
-        for k, name in enumerate(fit.model.functions)
-    ]
-    head = ["function", *(f"shift {a}, mm" for a in "xyz"), *(f"turn {a}, arcsec" for a in "xyz")]
-    parts = [
-        f"<header><h1>Structure: {s.group}</h1></header>",
-        verdict_line(found.verdict),
-        '<div class="cards">' + "".join(cards) + "</div>",
-        *(paragraph(note) for note in found.notes),
-        section(
-            "motion",
-            "Motion of the group",
-            picture(
-                svg(motion_figure(fit)),
-                "Shift and rotation about the pivot from the mean of the epochs, at the reference temperature. Band: "
-                "two standard uncertainties of a future epoch. Points: epochs without temperature and direction terms.",
-            ),
-            table(head, rows, "tnnnnnn"),
-        ),
-        section(
-            "residuals",
-            "Residuals",
-            picture(
-                svg(residual_figure(fit, check)), "Measured minus model, for each point and epoch; colours cover 98 %."
-            ),
-        ),
-    ]
-    if predicted is not None:
-        lines = [
-            [f"{e:g}", name, *(f"{v:.5f}" for v in predicted.place[k, i]),
-             *(f"{v * 1e3:.3f}" for v in np.sqrt(np.diag(predicted.covariance[k, i])))]
-            for k, e in enumerate(found.request.elevation_deg)
-            for i, name in enumerate(predicted.names)
-        ]  # fmt: skip
-        warned = [paragraph(text, "bad") for text in predicted.outside]
-        columns = ["elevation, degrees", "point", "x, m", "y, m", "z, m", "u x, mm", "u y, mm", "u z, mm"]
-        parts.append(section("prediction", "Predicted points", *warned, table(columns, lines, "ntnnnnnn")))
-    return page(f"Structure: {s.group}", "\n".join(parts))
-
-
-def _vibration_page(vibration: Vibration) -> str:
-    names = [s.name for s in vibration.series]
-    rows = [
-        [
-            f"{p.peak.frequency_hz:.3f}",
-            f"{p.likely_hz:.3f}" if p.decided else "open",
-            ", ".join(f"{f:.2f}" for f in p.may_be_hz),
-            f"{p.peak.over:.1f}",
-            "" if p.shape is None else f"{p.shape.rms.max() * 1e6:.1f} ({names[int(np.argmax(p.shape.rms))]})",
-        ]
-        for p in vibration.peaks
-    ]
-    modes = [
-        [f"{m.frequency_hz:.4f} ± {m.u_frequency_hz:.4f}", f"{m.damping_ratio:.4f} (× or ÷ {np.exp(m.u_damping):.2f})",
-         f"{np.sqrt(m.covariance[0, 0]) * 1e6:.1f}"]
-        for m in vibration.modes
-    ]  # fmt: skip
-    head = ["observed, Hz", "true, Hz", "possible, Hz", "times the background", "largest rms in the band, µm"]
-    parts = [
-        "<header><h1>Vibration</h1></header>",
-        *(paragraph(note) for note in vibration.notes),
-        section(
-            "spectra",
-            "Spectra",
-            picture(
-                svg(spectrum_figure(vibration)),
-                "One-sided density of each range; the band is the 95 % interval of the first one's density. Red: half "
-                "the rate. A question mark: it may be an alias.",
-            ),
-            table(head, rows, "nntnt"),
-        ),
-        section("modes", "Modes", table(["frequency, Hz", "damping ratio", "rms, µm"], modes, "nnn")),
-    ]
-    return page("Vibration", "\n".join(parts))

@@ -34,6 +34,7 @@ from catseye.gateways.surface.tables import (
 from catseye.gateways.writers.columns import Table
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import atomic_file
+from catseye.gateways.writers.report_page import report_page
 from catseye.gateways.writers.samplers_fits import join_tables, write_samplers
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.surface.actuators import rows_of
@@ -78,7 +79,7 @@ def write_surface(
     if actuators is not None:
         files["actuators.csv"] = lambda: actuators_csv(rows_of(actuators))
     files["surface.json"] = lambda: json_page(surface_object(result))
-    files["report.html"] = lambda: surface_report(result, when, inputs)
+    files["report.html"] = lambda: report_page(surface_report(result, when, inputs))
     outputs: Files = files
     provenance = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(result.shapes[-1].settings)}
     write_files(outputs, directory, {**provenance, **origin(when, inputs)}, progress=progress)

@@ -1,25 +1,31 @@
-"""Report of a surface, one self-contained HTML page."""
+"""Report of a surface."""
 
 from collections.abc import Mapping
 from datetime import datetime
-from html import escape
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
-from catseye.gateways.surface.figures import actuator_map, change_map, elevation_terms, shape_map, zernike_bars
-from catseye.gateways.surface.objects import (
-    actuators_passage,
-    change_passages,
-    lookup_passages,
-    shape_passages,
+from catseye.gateways.surface.objects import actuators_passage, change_passages, lookup_passages, shape_passages
+from catseye.gateways.surface.report_charts import (
+    actuator_charts,
+    change_chart,
+    elevation_charts,
+    shape_chart,
+    zernike_chart,
 )
-from catseye.gateways.writers.drawing import svg
-from catseye.gateways.writers.objects import versions
-from catseye.gateways.writers.page import card, page, paragraph, picture, section, table
-from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.verdict import verdict_line
-from catseye.optics.zernike import number
+from catseye.gateways.writers.report import (
+    Block,
+    Card,
+    ChartBlock,
+    ReportSection,
+    ResultReport,
+    TableBlock,
+    Text,
+    origin_section,
+)
+from catseye.gateways.writers.report_parts import ReportTable, number, sentences, text, uncertainty
+from catseye.optics.zernike import number as zernike_number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
 from catseye.reduction.surface.findings import SurfaceFindings
@@ -27,146 +33,171 @@ from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, MeanSquare, ShapeSettings, SurfaceShape
 
 
-def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> str:
-    """HTML report.
+def surface_report(result: SurfaceFindings, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
+    """Report of a surface.
 
     when     UTC
     inputs   SHA-256 of each input file, by name
     """
-    body = [_header(result, when), verdict_line(result.verdict)]
-    if result.lookup is not None:
-        body.append(_lookup(result.lookup))
-    if result.change is not None:
-        body.append(_change(result.change))
-    body += [_shape(shape, k + 1, len(result.shapes)) for k, shape in enumerate(result.shapes)]
-    if result.actuators is not None:
-        body.append(_actuators(result.actuators, result.shapes[-1]))
-    rows = [(name, digest) for name, digest in inputs.items()]
-    versions_text = ", ".join(f"{k} {v}" for k, v in versions().items())
-    body.append(section("origin", "Origin", paragraph(versions_text, "faint"), table(("file", "SHA-256"), rows, "th")))
-    return page("catseye: surface", "\n".join(body))
-
-
-def _header(result: SurfaceFindings, when: datetime) -> str:
     names = ", ".join(shape.prisms.source for shape in result.shapes)
-    return (
-        f"<header><h1>The surface</h1><div class='faint'>{escape(names)}; by catseye on {when:%Y-%m-%d %H:%M} UTC; "
-        "deviations along the normal, positive towards the focus; half-path errors are half of the "
-        "path's shortening; u = standard uncertainty, 1σ</div></header>"
+    single = result.shapes[0] if len(result.shapes) == 1 else None
+    return ResultReport(
+        title="The surface",
+        subtitle=(
+            f"{names}; by catseye on {when:%Y-%m-%d %H:%M} UTC; deviations along the normal, positive towards the "
+            "focus; half-path errors are half of the path's shortening; u = standard uncertainty, 1σ"
+        ),
+        verdict=result.verdict,
+        cards=_cards(single) if single is not None else [] if result.change is None else [_rms(result.change.square)],
+        passages=shape_passages(single) if single is not None else (),
+        sections=[
+            _lookup(result.lookup) if result.lookup else None,
+            _change(result.change) if result.change else None,
+            *(_shape(shape, k + 1, single is not None) for k, shape in enumerate(result.shapes)),
+            _actuators(result.actuators, result.shapes[-1]) if result.actuators else None,
+            origin_section(when, inputs),
+        ],
+        label="catseye: surface",
     )
 
 
-def _definitions(passages: list[Passage]) -> str:
-    return "<dl>" + "".join(f"<dt>{escape(p.title)}</dt><dd>{escape(p.text)}</dd>" for p in passages) + "</dl>"
+def _rms(square: MeanSquare) -> Card:
+    value = "not above the noise" if square.rms is None else f"{square.rms / MILLIMETRE:.3f} mm"
+    return Card("Half-path rms", value, "weighted by the illumination, without measurement noise")
 
 
-def _cards(square: MeanSquare, extra: list[str]) -> str:
-    text = "not above the noise" if square.rms is None else f"{square.rms / MILLIMETRE:.3f} mm"
-    first = card("Half-path rms", text, "weighted by the illumination, without measurement noise")
-    return f'<div class="cards">{first}{"".join(extra)}</div>'
-
-
-def _shape(shape: SurfaceShape, epoch: int, of: int) -> str:
-    title = "The dish" if of == 1 else f"Epoch {epoch}: {shape.prisms.source}"
-    gains = [
-        card(f"Gain at {g.frequency / 1e9:g} GHz", f"{g.ruze:.3f}", f"± {g.u_ruze:.3f} of the perfect surface's, Ruze")
+def _cards(shape: SurfaceShape) -> list[Card]:
+    return [_rms(shape.square)] + [
+        Card(f"Gain at {g.frequency / 1e9:g} GHz", f"{g.ruze:.3f}", f"± {g.u_ruze:.3f} of the perfect surface's, Ruze")
         for g in shape.gains
     ]
+
+
+def _quantities(key: str, cards: list[Card]) -> TableBlock:
+    heads = (text("quantity", "quantity"), text("value", "value"), text("remark", "remark"))
+    return TableBlock(key, ReportTable.of_rows(cards, *heads))
+
+
+def _shape(shape: SurfaceShape, epoch: int, single: bool) -> ReportSection:
     u = float(np.median(np.sqrt(np.diag(shape.fit.deviation_covariance)))) / MILLIMETRE
-    return section(
-        f"epoch-{epoch}",
-        title,
-        _cards(shape.square, gains),
-        _definitions(shape_passages(shape)),
-        picture(
-            svg(shape_map(shape)),
-            f"Half-path errors from the fitted paraboloid, u of a deviation {u:.3f} mm (median); colours between "
-            "prisms are linear interpolation in triangles. Dashed: the aperture.",
-        ),
-        *_terms(shape.expansion, shape.settings),
+    key = f"epoch-{epoch}"
+    lead: list[Block] = [
+        _quantities(f"{key}-quantities", _cards(shape)),
+        TableBlock(f"{key}-results", sentences(shape_passages(shape))),
+    ]
+    caption = f"Half-path errors from the fitted paraboloid, u of a deviation {u:.3f} mm (median). Line: the aperture."
+    return ReportSection(
+        key,
+        "The dish" if single else f"Epoch {epoch}: {shape.prisms.source}",
+        [
+            *([] if single else lead),
+            ChartBlock(f"{key}-map", shape_chart(shape), caption),
+            TableBlock(f"{key}-prisms", _prisms(shape), folded="Prisms and their half-path errors"),
+            *_terms(f"{key}-terms", shape.expansion, shape.settings),
+        ],
     )
 
 
-def _change(change: Change) -> str:
-    return section(
+def _prisms(shape: SurfaceShape) -> ReportTable:
+    fit = shape.fit
+    u = np.sqrt(np.diag(fit.deviation_covariance)) / MILLIMETRE
+    return ReportTable(
+        (
+            text("point", "prism", shape.prisms.names),
+            *(number(f"{a}_dish", f"{a} in the dish's frame", fit.local[:, k], "m", 5) for k, a in enumerate("xyz")),
+            number("deviation", "deviation", fit.deviation / MILLIMETRE, "mm", 4, u="u_deviation"),
+            uncertainty("u_deviation", "u", u, "mm", 4),
+            number("half_path", "half-path error", fit.half_path / MILLIMETRE, "mm", 4),
+        ),
+        "point",
+    )
+
+
+def _change(change: Change) -> ReportSection:
+    caption = "Second epoch minus first, after removing the dish's motion, fitted in all three coordinates."
+    return ReportSection(
         "change",
         "The change",
-        _cards(change.square, []),
-        _definitions(change_passages(change)),
-        picture(
-            svg(change_map(change)),
-            "Second epoch minus first, after removing the dish's motion, fitted in all three coordinates.",
-        ),
-        *_terms(change.expansion, change.settings),
+        [
+            _quantities("change-quantities", [_rms(change.square)]),
+            TableBlock("change-results", sentences(change_passages(change))),
+            ChartBlock("change-map", change_chart(change), caption),
+            *_terms("change-terms", change.expansion, change.settings),
+        ],
     )
 
 
-def _terms(expansion: Expansion, settings: ShapeSettings) -> list[str]:
+def _terms(key: str, expansion: Expansion, settings: ShapeSettings) -> list[Block]:
     u, u_joint = np.sqrt(np.diag(expansion.covariance)), np.sqrt(np.diag(expansion.joint_covariance))
-    rows = [
+    known = np.isfinite(u_joint)
+    table = ReportTable(
         (
-            str(number(term, settings.numbering)),
-            term.name,
-            f"{expansion.value[k] / MILLIMETRE:+.4f}",
-            f"{u[k] / MILLIMETRE:.4f}",
-            f"{round(100.0 * float(expansion.share[k]))} %",
-            *_cell(expansion.joint[k], u_joint[k]),
-        )
-        for k, term in enumerate(expansion.terms)
-    ]
-    columns = (settings.numbering, "term", "residual (mm)", "u (mm)", "absorbed by the fit", "term (mm)", "u (mm)")
+            number(
+                "number", settings.numbering, [zernike_number(t, settings.numbering) for t in expansion.terms], digits=0
+            ),
+            text("term", "term", [t.name for t in expansion.terms]),
+            number("residual", "residual", expansion.value / MILLIMETRE, "mm", 4, u="u_residual"),
+            uncertainty("u_residual", "u", u / MILLIMETRE, "mm", 4),
+            number("absorbed", "absorbed by the fit", 100.0 * np.asarray(expansion.share), "%", 0),
+            number("joint", "term", np.where(known, expansion.joint, np.nan) / MILLIMETRE, "mm", 4, u="u_joint"),
+            uncertainty("u_joint", "u of the term", u_joint / MILLIMETRE, "mm", 4),
+        ),
+        "term",
+    )
     return [
-        picture(svg(zernike_bars(expansion, settings)), "Zernike terms of the half-path errors after the fit."),
-        table(columns, rows, "ntnnnnn"),
-        paragraph(
+        ChartBlock(key, zernike_chart(expansion, settings), "Zernike terms of the half-path errors after the fit."),
+        TableBlock(key, table),
+        Text(
             "Residual: coefficient of the errors after the fit. Absorbed: share of the term's square absorbed by the "
-            "fitted paraboloid or the dish's motion. Term: estimated together with the paraboloid; empty where the "
+            "fitted paraboloid or the dish's motion. Term: estimated together with the paraboloid; unknown where the "
             "paraboloid absorbs it completely.",
-            "faint",
+            faint=True,
         ),
     ]
 
 
-def _cell(value: float, u: float) -> tuple[str, str]:
-    return (f"{value / MILLIMETRE:+.4f}", f"{u / MILLIMETRE:.4f}") if np.isfinite(u) else ("", "")
-
-
-def _lookup(lookup: Lookup) -> str:
-    numbering = lookup.shapes[0].settings.numbering
-    rows = [
-        (
-            str(number(model.term, numbering)),
-            model.term.name,
-            *(
-                f"{v / MILLIMETRE:+.4f} ± {model.raised * np.sqrt(s) / MILLIMETRE:.4f}"
-                for v, s in zip(model.value, np.diag(model.covariance), strict=True)
-            ),
-            f"{model.variance_factor:.2f}" if np.isfinite(model.variance_factor) else "",
+def _lookup(lookup: Lookup) -> ReportSection:
+    numbering, models = lookup.shapes[0].settings.numbering, lookup.models
+    u = [model.raised * np.sqrt(np.diag(model.covariance)) / MILLIMETRE for model in models]
+    coefficients = [
+        column
+        for k, name in enumerate(lookup.columns)
+        for column in (
+            number(f"c_{k + 1}", name, [m.value[k] / MILLIMETRE for m in models], "mm", 4, u=f"u_{k + 1}"),
+            uncertainty(f"u_{k + 1}", f"u {name}", [v[k] for v in u], "mm", 4),
         )
-        for model in lookup.models
     ]
-    columns = ("term", "name", *(f"{name} (mm)" for name in lookup.columns), "variance factor")
-    return section(
+    table = ReportTable(
+        (
+            number("number", "term", [zernike_number(m.term, numbering) for m in models], digits=0),
+            text("term", "name", [m.term.name for m in models]),
+            *coefficients,
+            number("variance_factor", "variance factor", [m.variance_factor for m in models], digits=2),
+        ),
+        "term",
+    )
+    return ReportSection(
         "elevation",
         "Terms by elevation",
-        _definitions(lookup_passages(lookup)),
-        picture(
-            svg(elevation_terms(lookup)),
-            "Terms that change most with elevation. Triangles: epochs, up and down; lines: the model; grey: its 1σ.",
-        ),
-        table(columns, rows, "nt" + "n" * (len(lookup.columns) + 1)),
-        paragraph(
-            "Thermal: mm per degree. Hysteresis: the term going up minus going down. Where "
-            "epochs scatter more than claimed (variance factor above 1), u is increased by its root.",
-            "faint",
-        ),
+        [
+            TableBlock("elevation-results", sentences(lookup_passages(lookup))),
+            *elevation_charts(lookup),
+            TableBlock("elevation-terms", table),
+            Text(
+                "Thermal: mm per degree. Hysteresis: the term going up minus going down. Where "
+                "epochs scatter more than claimed (variance factor above 1), u is increased by its root.",
+                faint=True,
+            ),
+        ],
     )
 
 
-def _actuators(actuators: Actuators, shape: SurfaceShape) -> str:
-    return section(
+def _actuators(actuators: Actuators, shape: SurfaceShape) -> ReportSection:
+    return ReportSection(
         "actuators",
         "Actuators",
-        _definitions([actuators_passage(actuators)]),
-        picture(svg(actuator_map(actuators, shape.aperture)), "Corrections and their standard uncertainty."),
+        [
+            TableBlock("actuator-results", sentences([actuators_passage(actuators)])),
+            *actuator_charts(actuators, shape.aperture),
+        ],
     )

@@ -9,10 +9,11 @@ from catseye.aliases import Progress
 from catseye.errors import InputError
 from catseye.gateways.calibrations.certificate_record import FORMAT
 from catseye.gateways.triplet.objects import triplet_object
-from catseye.gateways.triplet.sheet import html_sheet, text_sheet
+from catseye.gateways.triplet.sheet import text_sheet, triplet_report
 from catseye.gateways.triplet.tables import triplets_csv
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import PROVENANCE
+from catseye.gateways.writers.report_page import report_page
 from catseye.gateways.writers.written import origin, write_files
 from catseye.reduction.triplet.result import TripletReduction
 
@@ -38,7 +39,7 @@ def write_triplets(
     files: dict[str, Callable[[], str]] = {}
     for path, reduction in units.items():
         files[f"{path.stem}.txt"] = partial(text_sheet, reduction, path.name)
-        files[f"{path.stem}.html"] = partial(html_sheet, reduction, path.name, when, hashes[path])
+        files[f"{path.stem}.html"] = partial(_page, reduction, path.name, when, hashes[path])
         files[f"{path.stem}.json"] = partial(_object_page, reduction, path.name)
     files["triplets.csv"] = lambda: triplets_csv({path.name: reduction for path, reduction in units.items()})
     provenance = {"format": FORMAT, "made_by": "catseye triplet"}
@@ -61,3 +62,7 @@ def refuse_namesakes(paths: list[Path]) -> None:
                 f"{path}: has the name of {by_stem[path.stem]} (expected sheets of different names in one output)"
             )
         by_stem[path.stem] = path
+
+
+def _page(reduction: TripletReduction, file: str, when: datetime, digest: str) -> str:
+    return report_page(triplet_report(reduction, file, when, digest))

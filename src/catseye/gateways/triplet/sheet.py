@@ -1,21 +1,28 @@
-"""Sheet of a triplet's calibration, text and HTML, replacing the spreadsheet TRPCAL."""
+"""Sheet of a triplet's calibration, text and report, replacing the spreadsheet TRPCAL."""
 
 import math
 from collections.abc import Iterator, Sequence
 from datetime import datetime
-from html import escape
 from typing import Any
 
 from catseye.gateways.triplet.symbols import PLACEMENT, PLATE, POINTS, UNIT, Symbol, point_places, symbol_values
-from catseye.gateways.writers.objects import versions
-from catseye.gateways.writers.page import card, folded, page, paragraph, picture, section, table
-from catseye.gateways.writers.verdict import verdict_line
-from catseye.reduction.triplet.result import TripletReduction
+from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.report import (
+    Block,
+    Card,
+    ChartBlock,
+    ReportSection,
+    ResultReport,
+    TableBlock,
+    Text,
+    origin_section,
+)
+from catseye.gateways.writers.report_parts import Axis, Chart, ReportTable, number, text
+from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 from catseye.reduction.triplet.unit import NOT_A_TRIANGLE, SLIPPED
 
 TITLE = "Triplet calibration"
-SIDE_BY_SIDE = 3  # placements in one table
-UNCLIPPED = "<style>.scroll { max-height: none; } td.w { min-width: 12rem; }</style>"  # to print complete sheets
+SIDE_BY_SIDE = 3  # placements in one table of the text
 SHORT = {NOT_A_TRIANGLE: "no triangle", SLIPPED: "cycles doubted"}  # status in a column of the text
 PLACES = {"mm": 4, "rad": 6, "°C": 2, "hPa": 2, "%": 1}
 FINE = {"alpha": 6, "n": 6, "eta_A": 9, "eta_A_fp": 9, "eta_G": 6, "HWLV": 6, "HWLA": 6, "HWLA_fp": 6,
@@ -140,77 +147,108 @@ def _text_rows(symbols: Sequence[Symbol], reduction: TripletReduction, rows: sli
         yield f"{symbol.label:<14}{symbol.unit:<5}{cells}  {symbol.meaning}"
 
 
-def html_sheet(reduction: TripletReduction, file: str, when: datetime, digest: str) -> str:
-    """Self-contained page of the sheet, with a figure of placements.
+def triplet_report(reduction: TripletReduction, file: str, when: datetime, digest: str) -> ResultReport:
+    """Report of a triplet's calibration.
 
     reduction   the calibration of a unit
     file        name of its sheet; `digest` its SHA-256
     when        UTC, of the computation
     """
-    from catseye.gateways.triplet.figure import triplet_figure  # matplotlib is heavy
-    from catseye.gateways.writers.drawing import svg
-
     m = reduction.measurement
-    words = "".join(f"<dt>{escape(title)}</dt><dd>{escape(text)}</dd>" for title, text in results(reduction))
-    body = [
-        UNCLIPPED,
-        f"<header><h1>{TITLE}: {escape(m.triplet)}</h1>"
-        f'<div class="faint">prisms {m.left_prism.serial} (left) and {m.right_prism.serial} (right); measured on '
-        f"{m.measured_on} by {escape(m.by)}; air by {m.air_model}; u = standard uncertainty, 1σ</div></header>",
-        verdict_line(reduction.verdict),
-        '<div class="cards">' + "".join(_cards(reduction)) + "</div>",
-        f"<dl>{words}</dl>",
-        section(
-            "figure",
-            "Placements",
-            picture(svg(triplet_figure(reduction)), "H_corr of each placement, its limits, the budget"),
+    return ResultReport(
+        title=f"{TITLE}: {m.triplet}",
+        subtitle=(
+            f"prisms {m.left_prism.serial} (left) and {m.right_prism.serial} (right); measured on {m.measured_on} by "
+            f"{m.by}; air by {m.air_model}; u = standard uncertainty, 1σ"
         ),
-        section("unit", "Unit", _table(UNIT, reduction)),
-        section("plate", "Surface plate", _table(PLATE, reduction), _paint(reduction)),
-        section("ranges", "Ranges", *_placement_tables(reduction)),
-        section("points", "Points", _points(reduction)),
-        section(
-            "provenance",
-            "Provenance",
-            table(("input", "SHA-256"), [(file, digest)], "th"),
-            paragraph(f"Computed {when:%Y-%m-%d %H:%M:%S} UTC by catseye {versions()['catseye']}.", "faint"),
-            folded("Programs", table(("part", "version"), list(versions().items()), "tt")),
-        ),
-    ]
-    return page(f"{TITLE}: {m.triplet}", "\n".join(body))
-
-
-def _cards(reduction: TripletReduction) -> Iterator[str]:
-    yield card("H_corr", _signed(reduction.h_corr), f"u = {_plain(reduction.u_h_corr * 1e3, '.4f')} mm, by ranging")
-    yield card("L_MPBC", f"{reduction.l_mpbc * 1e3:+.4f} mm", f"u = {reduction.u_l_mpbc * 1e3:.4f} mm, surface plate")
-    yield card(
-        "accepted" if reduction.accepted else "NOT ACCEPTED",
-        _signed(reduction.difference),
-        f"limit ± 0.15 mm; conformity {_probability(reduction)}",
+        verdict=reduction.verdict,
+        cards=_cards(reduction),
+        passages=[Passage(title, words) for title, words in results(reduction)],
+        sections=[
+            ReportSection("placements", "Placements", [_placements_chart(reduction), *_budget(reduction)]),
+            ReportSection("unit", "Unit", [TableBlock("unit", _table(UNIT, reduction))]),
+            ReportSection(
+                "plate", "Surface plate", [TableBlock("plate", _table(PLATE, reduction)), *_paint(reduction)]
+            ),
+            ReportSection("ranges", "Ranges", [TableBlock("ranges", _placement_table(reduction))]),
+            ReportSection("points", "Points", [TableBlock("points", _points(reduction))]),
+            origin_section(when, {file: digest}),
+        ],
     )
 
 
-def _table(symbols: Sequence[Symbol], reduction: TripletReduction) -> str:
+def _cards(reduction: TripletReduction) -> list[Card]:
+    u = f"u = {_plain(reduction.u_h_corr * 1e3, '.4f')} mm, by ranging"
+    plate = f"u = {reduction.u_l_mpbc * 1e3:.4f} mm, surface plate"
+    return [
+        Card("H_corr", _signed(reduction.h_corr), u),
+        Card("L_MPBC", f"{reduction.l_mpbc * 1e3:+.4f} mm", plate),
+        Card(
+            "accepted" if reduction.accepted else "NOT ACCEPTED",
+            _signed(reduction.difference),
+            f"limit ± 0.15 mm; conformity {_probability(reduction)}",
+        ),
+    ]
+
+
+def _placements_chart(reduction: TripletReduction) -> ChartBlock:
+    """H_corr of each placement against the surface plate and the limits."""
+    known = [k for k, h in enumerate(reduction.h) if math.isfinite(h)]
+    names = [f"no. {k + 1}" for k in known]
+    odd = set(reduction.suspects)
+    chart = Chart(
+        "scatter",
+        Axis("placement", "", list(range(len(known))), names, digits=0),
+        Axis("ball above the prisms' mid-point", "µm", [reduction.h[k] * 1e6 for k in known], digits=2),
+        u=[reduction.u[k] * 1e6 for k in known],
+        names=names,
+        group=[1 if k in odd else 0 for k in known],
+        groups=("placement", "contradicted, retained"),
+        limits=[(reduction.l_mpbc + side * TOLERANCE) * 1e6 for side in (-1.0, 0.0, 1.0)],
+    )
+    text_ = "H_corr of each placement with its u; dashed: L_MPBC of the surface plate and its limits, ± 150 µm."
+    return ChartBlock("placements", chart, text_)
+
+
+def _budget(reduction: TripletReduction) -> list[Block]:
+    shares = sorted(reduction.budget.items(), key=lambda item: -item[1])
+    names = [name for name, _ in shares]
+    values = Axis("share in u of H_corr", "µm", [value * 1e6 for _, value in shares], digits=3)
+    chart = Chart("bars", Axis("cause", "", list(range(len(names))), names, digits=0), values, names=names)
+    return [ChartBlock("budget", chart, "Budget: shares in u of H_corr.")]
+
+
+def _symbols(rows: Sequence[Sequence[str]], values: Sequence[str]) -> ReportTable:
+    """Table of symbols; the values have as many decimals as each symbol's unit asks for."""
+    return ReportTable.of_rows(
+        rows,
+        text("symbol", "symbol"),
+        text("description", "description", kind="long"),
+        text("design", "design value"),
+        *(text(f"value_{k + 1}", head) for k, head in enumerate(values)),
+        text("unit", "unit"),
+    )
+
+
+def _table(symbols: Sequence[Symbol], reduction: TripletReduction) -> ReportTable:
     rows = [
         (s.label, s.meaning, s.design or "–", cell(s, symbol_values(s, reduction)[0]), s.unit or "–") for s in symbols
     ]
-    return table(("symbol", "description", "design value", "value", "unit"), rows, "twtnt")
+    return _symbols(rows, ("value",))
 
 
-def _placement_tables(reduction: TripletReduction) -> Iterator[str]:
-    for start in range(0, len(reduction.h), SIDE_BY_SIDE):
-        batch = range(start, min(start + SIDE_BY_SIDE, len(reduction.h)))
-        spacers = (f"{reduction.measurement.placement[k].spacer_mm:.3f}" for k in batch)
-        rows: list[tuple[str, ...]] = [("spacer", "in front of the rear stops", "–", *spacers, "mm")]
-        for s in PLACEMENT:
-            values = symbol_values(s, reduction)
-            cells = [cell(s, values[k if len(values) > 1 else 0]) for k in batch]
-            rows.append((s.label, s.meaning, s.design or "–", *cells, s.unit or "–"))
-        rows.append(("u(H_corr)", "of one placement", "–", *(_plain(reduction.u[k] * 1e3, ".4f") for k in batch), "mm"))
-        rows.append(("w", "standardised residual", "–", *(_plain(reduction.statistics[k], ".2f") for k in batch), "–"))
-        rows.append(("status", "", "", *(reduction.status[k] for k in batch), ""))
-        heads = [f"no. {k + 1}" for k in batch]
-        yield table(("symbol", "description", "design value", *heads, "unit"), rows, "twt" + "n" * len(batch) + "t")
+def _placement_table(reduction: TripletReduction) -> ReportTable:
+    every = range(len(reduction.h))
+    spacers = (f"{placement.spacer_mm:.3f}" for placement in reduction.measurement.placement)
+    rows: list[tuple[str, ...]] = [("spacer", "in front of the rear stops", "–", *spacers, "mm")]
+    for s in PLACEMENT:
+        values = symbol_values(s, reduction)
+        cells = [cell(s, values[k if len(values) > 1 else 0]) for k in every]
+        rows.append((s.label, s.meaning, s.design or "–", *cells, s.unit or "–"))
+    rows.append(("u(H_corr)", "of one placement", "–", *(_plain(reduction.u[k] * 1e3, ".4f") for k in every), "mm"))
+    rows.append(("w", "standardised residual", "–", *(_plain(reduction.statistics[k], ".2f") for k in every), "–"))
+    rows.append(("status", "", "", *(reduction.status[k] for k in every), ""))
+    return _symbols(rows, [f"no. {k + 1}" for k in every])
 
 
 def _plain(value: float, form: str) -> str:
@@ -221,24 +259,35 @@ def _signed(value: float) -> str:
     return f"{value * 1e3:+.4f} mm" if math.isfinite(value) else "unknown"
 
 
-def _paint(reduction: TripletReduction) -> str:
-    rows = [
-        (name, f"{low * 1e3:+.4f}", f"{high * 1e3:+.4f}")
-        for name, (low, high) in zip(("T₁", "T₂", "BC"), reduction.plate.departure, strict=True)
-    ]
+def _paint(reduction: TripletReduction) -> list[Block]:
+    table = ReportTable.of_rows(
+        [
+            (name, low * 1e3, high * 1e3)
+            for name, (low, high) in zip(("T₁", "T₂", "BC"), reduction.plate.departure, strict=True)
+        ],
+        text("point", "point above the bare top plate"),
+        number("thin", "paint 0.05 mm", unit="mm", digits=4),
+        number("thick", "paint 0.15 mm", unit="mm", digits=4),
+    )
     design = reduction.plate.paint_from_design * 1e3
-    text = f"Paint that would put the mean of the three in the bare top plate: {design:.4f} mm."
+    words = f"Paint that would put the mean of the three in the bare top plate: {design:.4f} mm."
     if reduction.plate.sampled:
         low, mean, high = (1e3 * height for height in reduction.plate.sampled)
-        text += f" Painted surface above the synthetic plane: {low:+.4f} to {high:+.4f} mm, mean {mean:+.4f} mm."
-    heads = ("point above the bare top plate", "paint 0.05 mm: mm", "paint 0.15 mm: mm")
-    return table(heads, rows, "tnn") + paragraph(text)
+        words += f" Painted surface above the synthetic plane: {low:+.4f} to {high:+.4f} mm, mean {mean:+.4f} mm."
+    return [TableBlock("paint", table), Text(words)]
 
 
-def _points(reduction: TripletReduction) -> str:
-    rows = [
-        (name, POINTS[name], str(k), *(_plain(1e3 * x, ".4f") for x in place))
-        for name, at in point_places(reduction).items()
-        for k, place in enumerate(at, start=1)
-    ]
-    return table(("point", "description", "no.", "along: mm", "up: mm", "towards the ranger: mm"), rows, "twnnnn")
+def _points(reduction: TripletReduction) -> ReportTable:
+    return ReportTable.of_rows(
+        [
+            (name, POINTS[name], k, *(1e3 * x for x in place))
+            for name, at in point_places(reduction).items()
+            for k, place in enumerate(at, start=1)
+        ],
+        text("point", "point"),
+        text("description", "description", kind="long"),
+        number("placement", "no.", digits=0),
+        number("along", "along", unit="mm", digits=4),
+        number("up", "up", unit="mm", digits=4),
+        number("towards", "towards the ranger", unit="mm", digits=4),
+    )

@@ -18,11 +18,6 @@ p { margin: .5rem 0; max-width: 78ch; }
 .faint, figcaption, caption { color: var(--faint); font-size: .9rem; }
 nav { margin: .9rem 0 0; font-size: .9rem; display: flex; flex-wrap: wrap; gap: .2rem 1.1rem; }
 a { color: var(--accent); text-decoration: none; } a:hover { text-decoration: underline; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(290px, 1fr)); gap: .8rem; margin: 1.3rem 0; }
-.card { background: var(--soft); border-left: 4px solid var(--accent); border-radius: 4px; padding: .7rem .95rem; }
-.card b { display: block; font-size: 1.55rem; line-height: 1.25; font-variant-numeric: tabular-nums; }
-.card span { display: block; color: var(--faint); font-size: .86rem; line-height: 1.4; }
-.card .name { color: var(--ink); font-weight: 600; }
 dl { display: grid; grid-template-columns: 7.5rem 1fr; gap: .45rem 1rem; margin: 1.2rem 0; }
 dt { font-weight: 600; } dd { margin: 0; max-width: 82ch; }
 figure { margin: 1rem 0 1.4rem; } figure img { display: block; width: 100%; height: auto; }
@@ -40,7 +35,7 @@ td.w { white-space: normal; min-width: 18rem; } td.h { font-family: ui-monospace
 .verdict.failed { background: #fbecec; border-color: var(--bad); }
 summary { cursor: pointer; color: var(--accent); margin: .6rem 0; }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; }
-  .scroll { overflow: visible; max-height: none; border: 0; } figure, .card, tr { break-inside: avoid; }
+  .scroll { overflow: visible; max-height: none; border: 0; } figure, tr { break-inside: avoid; }
   h2, h3 { break-after: avoid; } th { position: static; } table { font-size: 8pt; } }
 """
 
@@ -70,13 +65,6 @@ def picture(svg: str, caption: str) -> str:
     return (
         f'<figure><img src="data:image/svg+xml;base64,{source}" alt="{alternative}">'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
-
-
-def card(name: str, value: str, remark: str) -> str:
-    return (
-        f'<div class="card"><span class="name">{escape(name)}</span><b>{escape(value)}</b>'
-        f"<span>{escape(remark)}</span></div>"
     )
 
 
