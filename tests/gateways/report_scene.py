@@ -6,22 +6,24 @@ from html.parser import HTMLParser
 import numpy as np
 
 from catseye.gateways.writers.report import (
-    Axis,
-    Beams,
     Card,
-    Chart,
     ChartBlock,
-    Coloured,
     DrawingBlock,
     Heading,
     Items,
     ReportSection,
-    ReportTable,
     ResultReport,
-    Scene,
     SceneBlock,
     TableBlock,
     Text,
+)
+from catseye.gateways.writers.report_parts import (
+    Axis,
+    Beams,
+    Chart,
+    Coloured,
+    ReportTable,
+    Scene,
     categories,
     number,
     text,

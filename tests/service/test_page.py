@@ -23,7 +23,7 @@ SPEAKS = (
 
 
 def test_settings_come_back_from_their_line():
-    settings = PageSettings(**SITE, token=TOKEN, rangers={"ZY101": ("127.0.0.1", 24110)})
+    settings = PageSettings(**SITE, token=TOKEN, rangers={"ZY101": ("127.0.0.1", 24111)})
     assert read_settings(settings.model_dump_json()) == settings
 
 

@@ -4,16 +4,8 @@ import json
 
 import pytest
 
-from catseye.gateways.writers.report import (
-    ReportSection,
-    ReportTable,
-    ResultReport,
-    TableBlock,
-    number,
-    pairs,
-    report_object,
-    text,
-)
+from catseye.gateways.writers.report import ReportSection, ResultReport, TableBlock, report_object
+from catseye.gateways.writers.report_parts import ReportTable, number, pairs, text
 from gateways.report_scene import every_part
 
 

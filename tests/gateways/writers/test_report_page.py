@@ -10,19 +10,16 @@ import pytest
 from catseye.gateways.writers import report_page as module
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.report import (
-    Axis,
     Card,
-    Chart,
     ChartBlock,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
     report_object,
-    text,
 )
 from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import Axis, Chart, ReportTable, text
 from catseye.records.files.report_file import report_in
 from catseye.verdict import Verdict
 from gateways.report_scene import read, words_of

@@ -20,17 +20,13 @@ from catseye.gateways.writers.report import (
     Card,
     Heading,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    number,
     origin_section,
-    sentences,
-    text,
-    uncertainty,
 )
 from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, sentences, text, uncertainty
 from catseye.gateways.writers.written import Files, origin, write_files
 
 if TYPE_CHECKING:

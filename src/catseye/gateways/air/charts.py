@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import PPM
-from catseye.gateways.writers.report import Axis, Chart, ChartBlock
+from catseye.gateways.writers.report import ChartBlock
+from catseye.gateways.writers.report_parts import Axis, Chart
 from catseye.reduction.air.group_index import phase_slope
 
 if TYPE_CHECKING:

@@ -13,19 +13,9 @@ from catseye.gateways.air.charts import refractometer_charts
 from catseye.gateways.air.tables import series_csv
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.report import (
-    Card,
-    ReportSection,
-    ReportTable,
-    ResultReport,
-    TableBlock,
-    Text,
-    number,
-    origin_section,
-    text,
-    uncertainty,
-)
+from catseye.gateways.writers.report import Card, ReportSection, ResultReport, TableBlock, Text, origin_section
 from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import STATUS

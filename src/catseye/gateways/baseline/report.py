@@ -16,15 +16,12 @@ from catseye.gateways.writers.report import (
     Card,
     ChartBlock,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    number,
     origin_section,
-    text,
-    uncertainty,
 )
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline.result import BaselineCalibration

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
-from catseye.gateways.writers.report import Axis, Chart, ChartBlock
+from catseye.gateways.writers.report import ChartBlock
+from catseye.gateways.writers.report_parts import Axis, Chart
 
 if TYPE_CHECKING:
     from catseye.reduction.baseline.result import BaselineCalibration

@@ -15,21 +15,16 @@ from catseye.gateways.epoch.explain import (
     when,
 )
 from catseye.gateways.writers.report import (
-    Axis,
     Block,
     Card,
-    Chart,
     ChartBlock,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    number,
     origin_section,
-    text,
-    uncertainty,
 )
+from catseye.gateways.writers.report_parts import Axis, Chart, ReportTable, number, text, uncertainty
 from catseye.records.night.campaign import Campaign
 from catseye.reduction.budget.explanation import Explanation
 from catseye.reduction.budget.scene import Assumptions

@@ -4,7 +4,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.gateways.epoch.tables import kinds_of
-from catseye.gateways.writers.report import Axis, Beams, Chart, Coloured, Scene, categories
+from catseye.gateways.writers.report_parts import Axis, Beams, Chart, Coloured, Scene, categories
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.surface import DishFit
 

@@ -1,17 +1,8 @@
 """Poses of the dish by each command, as a table of the report."""
 
 from catseye.constants import ARCSECOND, MILLIMETRE
-from catseye.gateways.writers.report import (
-    Block,
-    Heading,
-    Items,
-    ReportTable,
-    TableBlock,
-    Text,
-    number,
-    text,
-    uncertainty,
-)
+from catseye.gateways.writers.report import Block, Heading, Items, TableBlock, Text
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.pose.dish_ways import dish_ways
 

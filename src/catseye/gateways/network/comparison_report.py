@@ -10,19 +10,8 @@ from catseye.gateways.network.comparison import comparison_passages
 from catseye.gateways.network.report import network_cards, provenance_section
 from catseye.gateways.network.report_charts import displacement_chart, displacement_view, lengthening
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.report import (
-    Block,
-    Card,
-    Heading,
-    ReportSection,
-    ReportTable,
-    ResultReport,
-    TableBlock,
-    Text,
-    number,
-    text,
-    uncertainty,
-)
+from catseye.gateways.writers.report import Block, Card, Heading, ReportSection, ResultReport, TableBlock, Text
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.reduction.network.comparison import ComparedEpochs
 from catseye.reduction.network.words import quantity
 

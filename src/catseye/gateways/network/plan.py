@@ -18,20 +18,9 @@ from catseye.gateways.network.summary import direction_words
 from catseye.gateways.network.tables import candidates_csv, coordinates_csv
 from catseye.gateways.writers.objects import json_page, plain
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.report import (
-    Block,
-    Card,
-    Heading,
-    ReportSection,
-    ReportTable,
-    ResultReport,
-    TableBlock,
-    Text,
-    number,
-    text,
-    uncertainty,
-)
+from catseye.gateways.writers.report import Block, Card, Heading, ReportSection, ResultReport, TableBlock, Text
 from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.network.plan import PlannedNetwork
 from catseye.reduction.network.words import quantity

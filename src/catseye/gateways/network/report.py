@@ -13,16 +13,12 @@ from catseye.gateways.writers.report import (
     Card,
     Heading,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    number,
     origin_section,
-    pairs,
-    text,
-    uncertainty,
 )
+from catseye.gateways.writers.report_parts import ReportTable, number, pairs, text, uncertainty
 from catseye.reduction.network.adjusted import AdjustedNetwork
 from catseye.reduction.network.words import quantity
 

@@ -3,16 +3,8 @@
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
-from catseye.gateways.writers.report import (
-    Axis,
-    Beams,
-    Chart,
-    ChartBlock,
-    Scene,
-    SceneBlock,
-    Text,
-    categories,
-)
+from catseye.gateways.writers.report import ChartBlock, SceneBlock, Text
+from catseye.gateways.writers.report_parts import Axis, Beams, Chart, Scene, categories
 from catseye.reduction.network.adjusted import AdjustedNetwork
 from catseye.reduction.network.comparison import UNTESTED, ComparedEpochs
 

@@ -32,16 +32,13 @@ from catseye.gateways.writers.report import (
     Card,
     Heading,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    number,
     origin_section,
-    text,
-    uncertainty,
 )
 from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.samplers_fits import join_tables
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.panels.crew import members, sessions, standing

@@ -4,7 +4,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.gateways.writers.report import Axis, Chart, ChartBlock, Coloured, categories
+from catseye.gateways.writers.report import ChartBlock
+from catseye.gateways.writers.report_parts import Axis, Chart, Coloured, categories
 from catseye.reduction.panels.crew import members, sessions
 from catseye.reduction.panels.heights import surface_rms
 

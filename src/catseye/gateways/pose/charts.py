@@ -3,19 +3,8 @@
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, TWO_PI
-from catseye.gateways.writers.report import (
-    Axis,
-    Block,
-    Chart,
-    ChartBlock,
-    Coloured,
-    ReportTable,
-    Scene,
-    SceneBlock,
-    categories,
-    number,
-    text,
-)
+from catseye.gateways.writers.report import Block, ChartBlock, SceneBlock
+from catseye.gateways.writers.report_parts import Axis, Chart, Coloured, ReportTable, Scene, categories, number, text
 from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.pointing_fit import PointingFit
 from catseye.reduction.pose.pointing_offsets import PointingOffset

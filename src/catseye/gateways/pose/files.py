@@ -15,20 +15,9 @@ from catseye.gateways.pose.objects import pose_result_object, pose_words
 from catseye.gateways.pose.tables import POINTS, points_csv
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.report import (
-    Block,
-    Card,
-    ReportSection,
-    ReportTable,
-    ResultReport,
-    TableBlock,
-    Text,
-    number,
-    origin_section,
-    text,
-    uncertainty,
-)
+from catseye.gateways.writers.report import Block, Card, ReportSection, ResultReport, TableBlock, Text, origin_section
 from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.network.written_pose import GROUP_POSE

@@ -23,19 +23,9 @@ from catseye.gateways.pose.tables import OBSERVATIONS, TILT, observations_csv, t
 from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.output import atomic_file
 from catseye.gateways.writers.passage import Passage
-from catseye.gateways.writers.report import (
-    Card,
-    ReportSection,
-    ReportTable,
-    ResultReport,
-    TableBlock,
-    Text,
-    number,
-    origin_section,
-    text,
-    uncertainty,
-)
+from catseye.gateways.writers.report import Card, ReportSection, ResultReport, TableBlock, Text, origin_section
 from catseye.gateways.writers.report_page import report_page
+from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.samplers_fits import SamplerColumn, SamplerTable, join_tables
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.records.files.toml_text import record_toml

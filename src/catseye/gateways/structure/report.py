@@ -9,23 +9,17 @@ import numpy as np
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.gateways.structure.objects import structure_passages, vibration_passages
 from catseye.gateways.writers.report import (
-    Axis,
     Block,
     Card,
-    Chart,
     ChartBlock,
     DrawingBlock,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    categories,
-    number,
     origin_section,
-    text,
-    uncertainty,
 )
+from catseye.gateways.writers.report_parts import Axis, Chart, ReportTable, categories, number, text, uncertainty
 from catseye.reduction.structure.check import LeaveOut
 from catseye.reduction.structure.findings import StructureFindings
 from catseye.reduction.structure.series import StructureFit

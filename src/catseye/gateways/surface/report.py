@@ -19,16 +19,12 @@ from catseye.gateways.writers.report import (
     Card,
     ChartBlock,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    number,
     origin_section,
-    sentences,
-    text,
-    uncertainty,
 )
+from catseye.gateways.writers.report_parts import ReportTable, number, sentences, text, uncertainty
 from catseye.optics.zernike import number as zernike_number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change

@@ -3,7 +3,8 @@
 import numpy as np
 
 from catseye.constants import MILLIMETRE, TWO_PI
-from catseye.gateways.writers.report import Axis, Chart, ChartBlock, Coloured
+from catseye.gateways.writers.report import ChartBlock
+from catseye.gateways.writers.report_parts import Axis, Chart, Coloured
 from catseye.optics.zernike import number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change

@@ -8,20 +8,16 @@ from typing import Any
 from catseye.gateways.triplet.symbols import PLACEMENT, PLATE, POINTS, UNIT, Symbol, point_places, symbol_values
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.report import (
-    Axis,
     Block,
     Card,
-    Chart,
     ChartBlock,
     ReportSection,
-    ReportTable,
     ResultReport,
     TableBlock,
     Text,
-    number,
     origin_section,
-    text,
 )
+from catseye.gateways.writers.report_parts import Axis, Chart, ReportTable, number, text
 from catseye.reduction.triplet.result import TOLERANCE, TripletReduction
 from catseye.reduction.triplet.unit import NOT_A_TRIANGLE, SLIPPED
 
