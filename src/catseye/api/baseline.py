@@ -126,12 +126,6 @@ class BaselineResult(Result):
 
         return baseline_report(self.calibration, when, self.hashes)
 
-    def _report(self, when: "datetime") -> "ResultReport":
-        """Report of `report.html`, made at a time, UTC."""
-        from catseye.gateways.baseline.report import baseline_report
-
-        return baseline_report(self.calibration, when, self.hashes)
-
     def write(self, directory: Path, progress: Progress | None = None) -> None:
         """Write the files of `catseye baseline --out`."""
         from catseye.gateways.baseline.files import write_calibration
