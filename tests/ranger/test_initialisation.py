@@ -13,9 +13,9 @@ from catseye.ranger.initialisation import (
     commands_of_ranger,
     cube_numbers,
     cube_places_mm,
+    SiteCommands,
     cubes_commands,
     dish_centre,
-    files_of_ranger,
     frame_of,
     head_commands,
     local_station,
@@ -170,7 +170,7 @@ def test_motion_settings_are_sent_in_a_valid_order(gbt):
 
 
 def test_files_agree_with_the_commands(gbt, tmp_path):
-    files = files_of_ranger(gbt, "ZY113", places=places_of(gbt))
+    files = SiteCommands(gbt).files("ZY113")
     assert list(files) == ["CUBES.INI", "ZY113.INI", "zp113.INI"]
     for name, text in files.items():
         (tmp_path / name).write_text(text, "ascii")
