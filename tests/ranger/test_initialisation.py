@@ -10,10 +10,10 @@ from catseye.errors import InputError
 from catseye.geometry.mirror.pointing import aim, ray
 from catseye.ranger.addresses import feed_address, ranger_addresses
 from catseye.ranger.initialisation import (
+    SiteCommands,
     commands_of_ranger,
     cube_numbers,
     cube_places_mm,
-    SiteCommands,
     cubes_commands,
     dish_centre,
     frame_of,

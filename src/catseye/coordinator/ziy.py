@@ -148,6 +148,7 @@ class Coordinator:
         self.feed = self._listening(*feed, environment) if isinstance(feed, tuple) else None
         self.posture: LivePosture | None = None
         self.round_number = 0
+        self.round_ticks: tuple[int, int] | None = None  # begin and end of the last planned round
         self.answer: EpochAnswer | None = None
         self._solving: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
@@ -259,6 +260,7 @@ class Coordinator:
             planned = None if stopped else self._planned(now_ticks)
             if planned is not None:
                 self.round_number += 1
+                self.round_ticks = now_ticks, planned.end_ticks
                 self.firing.begin(planned)
             if not stopped:
                 self.firing.begin_streams()

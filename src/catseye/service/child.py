@@ -15,7 +15,7 @@ from catseye.errors import InputError
 from catseye.interruption import undo_on_interruption
 
 PROGRAM = (sys.executable, "-P", "-m", "catseye")
-LONGEST_START = 120.0  # s until the child's first line: its kernels are compiled the first time
+LONGEST_START = 120.0  # s until the child is up: its kernels are compiled the first time
 LONGEST_LEAVE = 1.0  # s from SIGTERM until it is killed: the parent has to exit within five
 FIRST_WAIT, LONGEST_WAIT, LIVED = 1.0, 30.0, 60.0  # s of back-off before a restart, doubled unless it ran for LIVED
 LineHandler = Callable[[str], None]
@@ -29,6 +29,9 @@ class LiveChild:
     said       called with each line of its standard output
     warned     called with each line of its standard error
     program    that takes the arguments
+    is_up      True for the line of its output by which it has started; the first one by default
+
+    `ended` is called when it has ended, or could not start.
     """
 
     def __init__(
@@ -39,13 +42,16 @@ class LiveChild:
         said: LineHandler,
         warned: LineHandler,
         program: Sequence[str] = PROGRAM,
+        is_up: Callable[[str], bool] = lambda line: True,
     ):
+        self._is_up = is_up
+        self.ended: Callable[[], None] = lambda: None
         self._program = tuple(program)
         self.name, self._arguments, self._said, self._warned = name, tuple(arguments), said, warned
         self._process: asyncio.subprocess.Process | None = None
         self._readers: list[asyncio.Task[None]] = []
         self._last_warning = ""
-        self._output_seen = asyncio.Event()
+        self._up = asyncio.Event()
 
     @property
     def pid(self) -> int | None:
@@ -53,11 +59,11 @@ class LiveChild:
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Start it and wait for its first line.
+        """Start it and wait until it is up.
 
         Raises InputError if it exits before, with its last message, or takes too long.
         """
-        self._output_seen.clear()
+        self._up.clear()
         self._last_warning = ""
         self._process = await asyncio.create_subprocess_exec(
             *self._program,
@@ -72,16 +78,16 @@ class LiveChild:
             asyncio.create_task(self._read(process.stdout, self._hear)),
             asyncio.create_task(self._read(process.stderr, self._warn)),
         ]
-        exit_task, output_task = asyncio.create_task(process.wait()), asyncio.create_task(self._output_seen.wait())
+        exit_task, up_task = asyncio.create_task(process.wait()), asyncio.create_task(self._up.wait())
         try:
-            await asyncio.wait([exit_task, output_task], timeout=LONGEST_START, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait([exit_task, up_task], timeout=LONGEST_START, return_when=asyncio.FIRST_COMPLETED)
         finally:
             exit_task.cancel()
-            output_task.cancel()
-        if self._output_seen.is_set():
+            up_task.cancel()
+        if self._up.is_set():
             return
         await self.stop()
-        why = self._last_warning.removeprefix("catseye: ") or f"no output for {LONGEST_START:g} s"
+        why = self._last_warning.removeprefix("catseye: ") or f"it has not started within {LONGEST_START:g} s"
         raise InputError(f"{self.name}: {why}")
 
     async def keep(self, *, patient: bool = False) -> None:
@@ -99,6 +105,7 @@ class LiveChild:
                 while True:
                     started = loop.time()
                     status = await self._process.wait() if self._process is not None else None
+                    self.ended()
                     wait = FIRST_WAIT if loop.time() - started > LIVED else wait
                     what = "did not start" if self._process is None else f"ended with status {status}"
                     self._warned(f"{what}; restarting in {wait:g} s")
@@ -139,7 +146,8 @@ class LiveChild:
 
     def _hear(self, line: str) -> None:
         self._said(line)
-        self._output_seen.set()
+        if self._is_up(line):
+            self._up.set()
 
     def _warn(self, line: str) -> None:
         self._last_warning = line

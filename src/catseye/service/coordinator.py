@@ -3,7 +3,7 @@
 import asyncio
 import gc
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -284,8 +284,13 @@ class LiveCoordinator:
         """Process id of the solver."""
         return None if self._solver is None else self._solver.pid
 
-    async def run(self, started: Callable[[], None] = lambda: None) -> None:
+    async def run(
+        self, started: Callable[[], None] = lambda: None, ready: Callable[[], Awaitable[None]] | None = None
+    ) -> None:
         """Measure until cancelled; then switch everything off within five seconds.
+
+        started   called when its own port answers
+        ready     awaited before it connects to the rangers: they start beside it
 
         Raises InputError if its own port is not available.
         """
@@ -303,6 +308,8 @@ class LiveCoordinator:
                 loading = asyncio.gather(self._start_solver(self._solver), asyncio.to_thread(_load_kernel))
                 gc.collect()
                 gc.freeze()  # a full collection of a site with thousands of records takes 40 ms
+            if ready is not None:
+                await ready()
             await self.ziy.run()
         finally:
             if watching is not None:

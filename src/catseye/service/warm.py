@@ -22,6 +22,7 @@ from catseye.ranger.ranger import Ranger
 from catseye.ranger.sun_watch import sun_departure_mjd
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import SiteFolder
+from catseye.service.listening import STEP_NAME
 
 BEFORE = 300.0  # s before the start, when the rangers are powered on
 STEP = 0.05  # s between two polls of a busy ranger
@@ -39,7 +40,6 @@ HOMING = (  # amplifiers, then the indices with the laser off, then the laser, t
     ),
 )
 CLIENT = 0
-STEP_NAME = "rangers ready"  # of progress
 
 
 class WarmingClock:
