@@ -62,7 +62,7 @@ front-check: front/node_modules  # types, and the committed files against a new 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
 
-bench: setup  ## benchmarks, as ratios in one run: main job, phases, positions, networks, pointing, air, delays, living site, surfaces
+bench: setup  ## benchmarks, as ratios in one run: main job, phases, positions, networks, pointing, air, delays, living site and its start, surfaces
 	$(BIN)/python benchmarks/bench_reduce.py
 	$(BIN)/python benchmarks/bench_phase.py
 	$(BIN)/python benchmarks/bench_positions.py
@@ -71,6 +71,7 @@ bench: setup  ## benchmarks, as ratios in one run: main job, phases, positions, 
 	$(BIN)/python benchmarks/bench_air.py
 	$(BIN)/python benchmarks/bench_delay.py
 	$(BIN)/python benchmarks/bench_live.py
+	$(BIN)/python benchmarks/bench_start.py
 	$(BIN)/python benchmarks/bench_surface.py
 	$(BIN)/python benchmarks/bench_structure.py
 

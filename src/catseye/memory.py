@@ -1,9 +1,11 @@
 """Process memory: release of freed pages, and messages for a run out of memory."""
 
 import ctypes
+import gc
 import math
 import resource
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 GIB = 2.0**30
 MALLOPT = {-3: 2**18, -8: 2}  # M_MMAP_THRESHOLD, bytes; M_ARENA_MAX (mallopt(3))
@@ -17,6 +19,18 @@ def give_back() -> None:
     """Return freed memory to the system before a demanding step; glibc keeps fragments."""
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Collect no garbage in the block: what a start makes stays, and each collection would search it all."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def keep_heap_small() -> None:

@@ -30,7 +30,7 @@ class ScenedSite:
         self.firing = SimpleNamespace(dropped=set(), suspensions=Suspensions())
         self.intake = SimpleNamespace(trouble=None)
         self.mode, self.believed, self.telescope = "active", True, True
-        self.round_number, self.numbers = 4, 0
+        self.round_number, self.numbers, self.round_ticks = 4, 0, None
         self.site = SimpleNamespace(site=SimpleNamespace(campaign=SimpleNamespace(name="gbt")))
         self.condition = ConditionWatch(
             self.clock,
@@ -42,6 +42,9 @@ class ScenedSite:
             telescope_known=lambda: self.telescope,
         )
         self.book = RunSummary()
+
+    def ticks(self):
+        return ticks_now(self.clock)
 
     @property
     def running(self):

@@ -16,9 +16,9 @@ from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.writer import Journal
 from catseye.coordinator.parts import Environment
 from catseye.coordinator.ziy import Coordinator, CoordinatorParts
+from catseye.ranger.initialisation import SiteCommands
 from catseye.reduction.live.live import Live
 from catseye.service.solver import SolverProcess
-from catseye.service.warm import initialising_commands
 from load_scene import EverySecond, LoadChild, load_site, lost_and_doubled
 
 TARGETS = 4
@@ -41,7 +41,7 @@ async def once_a_second(child, site, place, seconds):
         environment=Environment(child.clock),
         feed=child.feed,
         mode="hold",
-        commands=initialising_commands(site),
+        commands=SiteCommands(site).of_ranger,
     )
     ziy.listeners.append(lambda entry: acknowledged.extend(told(entry)))
     task = asyncio.create_task(ziy.run())

@@ -10,12 +10,12 @@ from catseye.errors import InputError
 from catseye.geometry.mirror.pointing import aim, ray
 from catseye.ranger.addresses import feed_address, ranger_addresses
 from catseye.ranger.initialisation import (
+    SiteCommands,
     commands_of_ranger,
     cube_numbers,
     cube_places_mm,
     cubes_commands,
     dish_centre,
-    files_of_ranger,
     frame_of,
     head_commands,
     local_station,
@@ -170,7 +170,7 @@ def test_motion_settings_are_sent_in_a_valid_order(gbt):
 
 
 def test_files_agree_with_the_commands(gbt, tmp_path):
-    files = files_of_ranger(gbt, "ZY113", places=places_of(gbt))
+    files = SiteCommands(gbt).files("ZY113")
     assert list(files) == ["CUBES.INI", "ZY113.INI", "zp113.INI"]
     for name, text in files.items():
         (tmp_path / name).write_text(text, "ascii")

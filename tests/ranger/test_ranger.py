@@ -321,6 +321,16 @@ def test_replaced_file_becomes_bak_and_an_invalid_one_replaces_nothing(tmp_path)
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"ZY101.INI": "D0 2 ; newer", "ZY101.BAK": "D0 1"}
 
 
+def test_lines_known_to_be_valid_are_not_read_again(tmp_path):
+    valid = set()
+    replace_file(tmp_path, "ZY101.INI", "D0 1\nD0 2", valid)
+    assert valid == {"D0 1", "D0 2"}
+    with pytest.raises(InputError, match=r"ZY101\.INI line 2: "):
+        replace_file(tmp_path, "ZY101.INI", "D0 1\nD0 -1", valid)
+    assert valid == {"D0 1", "D0 2"}
+    assert (tmp_path / "ZY101.INI").read_text() == "D0 1\nD0 2"
+
+
 def test_sun_is_refused_by_vector_and_by_own_computation():
     told = ready()
     at = np.array(PLACES[1][1]) - [0, 0, 250.0]

@@ -13,8 +13,8 @@ from catseye.records.night.live import Happening, LivePosture, LiveShot
 from catseye.service.book import RunSummary
 from catseye.service.comparison import EpochComparison
 from catseye.service.objects import epoch_line, simulation_object, summary
-from catseye.service.screen import LinesView
 from catseye.service.simulation import Simulation
+from catseye.service.views import LinesView
 from catseye.service.world import TwinWords
 from simulator.living_scene import site
 
@@ -186,7 +186,7 @@ def test_plain_lines_show_epochs_and_ongoing_problems():
     said = []
     view = LinesView(said.append)
     book, _ = filled()
-    view.begin(book, None)
+    view.begin(book, None, None)
     for entry in (
         epoch(1),
         Happening(6, "coordinator", "blocked", "one shot", "debug"),

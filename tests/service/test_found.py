@@ -9,7 +9,7 @@ from catseye.records.night.live import TICKS_PER_DAY, Happening
 from catseye.service.book import RunSummary
 from catseye.service.found import SIGNS, FaultFinder
 from catseye.service.objects import simulation_object, summary
-from catseye.service.screen import LinesView
+from catseye.service.views import LinesView
 from catseye.service.world import TwinWords
 from catseye.simulator.twin.faults import Kind
 
@@ -67,7 +67,7 @@ def test_first_event_counts_in_text_and_json():
     book = RunSummary(finder=FaultFinder(world.faults, START))
     said = []
     view = LinesView(said.append)
-    view.begin(book, None)
+    view.begin(book, None, None)
     for entry in (told(40.4, "ZY104", "lost"), told(41.0, "ZY104", "no-reply"), told(100.0, "ZY101", "slow")):
         book.entry(entry)
         view.entry(entry)

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from catseye.constants import DEGREE
+from catseye.coordinator.link.preparation import Preparation
 from catseye.coordinator.visibility.vantage import reflector_at, vantages_of
 from catseye.errors import InputError
 from catseye.geometry.mirror.pointing import beam
+from catseye.ranger.initialisation import SiteCommands
 from catseye.ranger.line import Request
+from catseye.ranger.ranger import Ranger
 from catseye.ranger.sun_watch import HALF_ANGLE, PARKED, SET, nearest_sun, sun_departure_mjd, sun_of_site, way_out
 from catseye.records.files.examples import located
 from catseye.records.night.live import LivePosture
@@ -18,9 +21,10 @@ from catseye.records.site.folder import read_site
 from catseye.reduction.site.earth_rotation import place_of, sun_at
 from catseye.service.rangers import RangersServed
 from catseye.service.running import FastLoop
-from catseye.service.warm import WarmingClock
+from catseye.service.warm import WarmingClock, _Loader
 from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
+from ranger.scripted_head import ScriptedHead
 
 YEAR, HOURS = 61041.0, 8760  # MJD of 2026-01-01
 INDEX = (0.0, 0.0)  # counts
@@ -114,6 +118,24 @@ def test_site_starts_with_a_mirror_looking_at_the_sun(hour, name):
     assert nearest_sun(ranger.cubes.station, ranger.here, ranger.here, suns=[seen], exact=True) >= HALF_ANGLE or (
         not ranger.head.laser_on()
     )
+
+
+def test_cubes_taken_over_from_another_ranger_are_those_of_its_own_commands():
+    """All 18 by one loader, which gives each cube's commands once, against each by all of its lines."""
+    commands, loader = SiteCommands(gbt()), _Loader()
+    for name in gbt().rangers:
+        requests = Preparation.of(commands.of_ranger(name)).requests
+        quick, slow = (Ranger(name, ScriptedHead(), limits=(-1e9, 1e9)) for _ in range(2))
+        loader.load(quick, requests)
+        if name in ("ZY101", "ZY102", "ZY113", "ZY118"):
+            for request in requests:
+                slow.work_of(0, request)
+            assert quick.cubes.by_number == slow.cubes.by_number
+            assert quick.cubes.geometry == slow.cubes.geometry
+            assert quick.given == slow.given
+            assert quick.cubes.find("DP20C") == slow.cubes.find("dp20c")
+            assert quick.cubes.counts(quick.cubes.find("ZEG41040L")) == slow.cubes.counts(slow.cubes.find("ZEG41040L"))
+        assert name not in [cube.name for cube in quick.cubes.by_number.values()]
 
 
 def test_ranger_without_index_stays_dark_and_others_serve():

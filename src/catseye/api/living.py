@@ -3,6 +3,7 @@
 import asyncio
 import math
 import os
+import signal
 from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -13,9 +14,10 @@ from catseye.api.journal import journal_place, run_of
 from catseye.api.live.limits import within
 from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
-from catseye.api.serving import MOTION, coordinator_orders, mjd_start, read_site_of, twin_options
+from catseye.api.serving import MOTION, OrderOptions, coordinator_orders, mjd_start, read_site_of, twin_options
 from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError
+from catseye.memory import uncollected
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
     from catseye.service.world import TwinWords
 
 NIGHT = 60_635.125  # MJD: 22 h at Green Bank, no Sun and no Moon that matter
-UNTIL_READY = 12.0  # s that a twin takes to start: its faults' times count from about the first round on
+UNTIL_READY = 5.0  # s that a twin takes to start: its faults' times count from about the first round on
 MOST_MINUTES = 1e6
 
 
@@ -126,41 +128,66 @@ def simulate(
 
     Raises InputError for a site, fault or journal that cannot be used; ArgumentError for invalid arguments.
     """
-    from catseye.records.site.folder import SiteFolder
-    from catseye.service.objects import epoch_object, simulation_verdict
-    from catseye.service.running import FastLoop
-    from catseye.service.screen import LinesView, ScreenView, SilentView
-    from catseye.service.simulation import Simulation
-
     within("minutes", minutes, 0.0, MOST_MINUTES)
     if minutes == 0.0 and not end_on_signals:
         raise ArgumentError("minutes = 0 never ends (expected above 0, or end_on_signals)", "minutes", "end_on_signals")
-    if isinstance(site, SiteFolder) and not fast:
+    if not fast and not isinstance(site, str | os.PathLike):
         raise ArgumentError("site: the twin's process reads it (expected a folder, or fast)", "site", "fast")
     within("port_base", port_base, 0, 65_000)
     world = _world(mjd_start(start_mjd, NIGHT), twin_options(seed, motion, conditions, faults), fast)
-    orders = coordinator_orders(
-        drop=drop,
-        round_s=round_s,
-        filter_=filter_,
-        journal=journal,
-        keep_buffers=keep_buffers,
-        port=0 if port is None and (fast or port_base == 0) else port,
-    )
-    records = site if isinstance(site, SiteFolder) else read_site_of(site)
-    view = ScreenView() if screen else SilentView() if tell is None else LinesView(tell)
-    simulation = Simulation(
-        site=records,
-        name="" if isinstance(site, SiteFolder) else str(site),  # of real time, for the twin's process
-        world=world,
-        orders=orders,
-        minutes=minutes,
-        view=view,
-        port_base=port_base,
-        warm=not cold,
-    )
-    work = simulation.run_fast if fast else simulation.run
-    number = _run(work, FastLoop if fast else None, end_on_signals)
+    orders: OrderOptions = {
+        "drop": drop,
+        "round_s": round_s,
+        "filter_": filter_,
+        "journal": journal,
+        "keep_buffers": keep_buffers,
+        "port": 0 if port is None and (fast or port_base == 0) else port,
+    }
+    from catseye.service.display import view_of
+
+    view = view_of(screen=screen, tell=tell)
+    made: list[Simulation] = []
+
+    def assembled() -> "Simulation":
+        """The simulation; what it needs is imported and read here."""
+        from catseye.service.simulation import Simulation
+
+        given = coordinator_orders(**orders)
+        records = read_site_of(site) if isinstance(site, str | os.PathLike) else site
+        made.append(Simulation(site=records, world=world, orders=given, minutes=minutes, view=view, warm=not cold))
+        return made[0]
+
+    async def work() -> None:
+        from catseye.service.twin_process import TwinProcess, twin_arguments
+
+        view.open(str(site) if isinstance(site, str | os.PathLike) else site.site.campaign.name)
+        view.tell("starting the twin")
+        if fast:
+            await assembled().run_fast()
+            return
+        arguments = [*twin_arguments(str(site), world, port_base), *(["--cold"] if cold else [])]
+        async with TwinProcess(arguments, progress=view.progress) as twin:
+            twin.report(warned=lambda line: view.tell(f"twin: {line}"))
+            with uncollected():
+                simulation = await asyncio.to_thread(assembled)
+            await simulation.run(twin)
+
+    try:
+        number = _run(work, fast, end_on_signals)
+    finally:
+        view.end()
+    if number and not made:  # before there was anything to end in order: the signal acts as anywhere else
+        signal.raise_signal(number)
+    return _simulated(made[0] if made else assembled(), number)
+
+
+def _simulated(simulation: "Simulation", number: int) -> SimulationResult:
+    """Result of a simulation that has ended.
+
+    number   of the signal that ended it; 0 for none
+    """
+    from catseye.service.objects import epoch_object, simulation_verdict
+
     return SimulationResult(
         verdict=simulation_verdict(simulation.book),
         seconds=simulation.seconds,
@@ -177,14 +204,17 @@ def _world(begins: float, options: dict[str, Any], fast: bool) -> "TwinWords":
     return TwinWords(begins, **options) if fast else TwinWords.starting_now(begins, **options).late(UNTIL_READY)
 
 
-def _run(work: "Callable[[], Coroutine[Any, Any, None]]", loop_factory: Any, end_on_signals: bool) -> int:
+def _run(work: "Callable[[], Coroutine[Any, Any, None]]", fast: bool, end_on_signals: bool) -> int:
     """Number of the signal that ended the work; 0 for its own end.
+
+    fast   True for a loop in virtual time
 
     Without signals it runs in a thread: a notebook's own loop is already running here.
     """
-    if end_on_signals:
-        from catseye.service.running import LiveRun
+    from catseye.service.running import FastLoop, LiveRun
 
+    loop_factory = FastLoop if fast else None
+    if end_on_signals:
         run: LiveRun[None] = LiveRun(work, loop_factory=loop_factory)
         run.result()
         return run.signal

@@ -5,22 +5,27 @@ They install handlers of SIGINT and SIGTERM, and are not exported from `catseye`
 
 import asyncio
 import os
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
+from catseye.aliases import Progress
 from catseye.api.journal import mjd_argument
-from catseye.api.live.beside import SitePage, site_page
+from catseye.api.live.beside import site_page
 from catseye.api.live.limits import LAST_PORT, one_of, within
 from catseye.api.reading import place_of
 from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError, InputError
+from catseye.memory import uncollected
 
 if TYPE_CHECKING:
     from catseye.records.site.folder import SiteFolder
     from catseye.service.coordinator import Orders, Peers
-    from catseye.service.logs import LiveLog
-    from catseye.service.serving import SiteEnd
+    from catseye.service.display import LogOptions
+    from catseye.service.running import SiteEnd
+    from catseye.service.serving import ServedSite
+    from catseye.service.twin_process import TwinProcess
     from catseye.service.world import TwinWords
 
     Tell = Callable[[str], None]
@@ -73,6 +78,8 @@ def zy(
     files: Place = None,
     leave_with_stdin: bool = False,
     listening: Callable[[dict[str, Any]], None],
+    bound: Callable[[dict[str, Any]], None] = lambda at: None,
+    progress: Progress = lambda what, done, total: None,
     tell: "Tell" = lambda line: None,
 ) -> "SiteEnd":
     """Serve one ranger, some, or all of a site's, until a signal.
@@ -101,31 +108,37 @@ def zy(
     from catseye.clock import SystemClock
     from catseye.ranger.door import Door, key_of
     from catseye.ranger.network import TlsFiles
-    from catseye.service.rangers import ListenAddresses, RangersServed, heads_of
-    from catseye.service.serving import serve_rangers
+    from catseye.service.rangers import ListenAddresses, RangersServed, heads_of, serve_rangers
 
     _refuse_serving(twin, head, loopback, host, ports, port_base, clock_offset_s)
     world = twin_world(start_mjd, clock_offset_s, twin_options(seed, motion, conditions, faults))
-    records = read_site_of(site)
-    names = _named(records, rangers)
-    if ports is not None and len(names) != 1:
-        raise InputError(f"{len(names)} rangers cannot share two ports (expected one ranger, or a port base)")
-    door = Door(key=key_of(), tls=TlsFiles.of(), laser_at_boot=laser_at_boot)
-    at = ListenAddresses("loopback" if loopback else port_base, host, ports, door)
-    if laser_at_boot:
-        tell("warning: lasers shine from power-up on (laser at boot), where nobody has the lease and unhomed")
-    where = None if files is None else Path(files)
-    if head is not None:
-        served = RangersServed(records, heads_of(head, names), clock=SystemClock(), at=at, files=where)
-    else:
-        from catseye.service.warm import WarmingClock
-        from catseye.service.world import twin_heads
+    with uncollected():
+        records = read_site_of(site)
+        names = _named(records, rangers)
+        if ports is not None and len(names) != 1:
+            raise InputError(f"{len(names)} rangers cannot share two ports (expected one ranger, or a port base)")
+        door = Door(key=key_of(), tls=TlsFiles.of(), laser_at_boot=laser_at_boot)
+        at = ListenAddresses("loopback" if loopback else port_base, host, ports, door)
+        if laser_at_boot:
+            tell("warning: lasers shine from power-up on (laser at boot), where nobody has the lease and unhomed")
+        where = None if files is None else Path(files)
+        if head is not None:
+            served = RangersServed(records, heads_of(head, names), clock=SystemClock(), at=at, files=where)
+        else:
+            from catseye.service.warm import WarmingClock
+            from catseye.service.world import twin_heads
 
-        truth, clock = world.twin(records), world.clock()
-        warming = None if cold else WarmingClock(clock)
-        heads = twin_heads(truth, names, warming or clock)
-        served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, at=at, files=where)
-    return serve_rangers(served, lambda at: listening(at.plain()), leave_with_stdin=leave_with_stdin)
+            truth, clock = world.twin(records), world.clock()
+            warming = None if cold else WarmingClock(clock)
+            heads = twin_heads(truth, names, warming or clock)
+            served = RangersServed(records, heads, clock=clock, twin=truth, warming=warming, at=at, files=where)
+    return serve_rangers(
+        served,
+        lambda at: listening(at.plain()),
+        leave_with_stdin=leave_with_stdin,
+        bound=lambda at: bound(at.plain()),
+        progress=progress,
+    )
 
 
 @with_units
@@ -160,14 +173,20 @@ def ziy(
     Raises InputError: an unknown site or file, a port or a journal that is not available; ArgumentError: invalid
     arguments.
     """
-    from catseye.service.serving import LogOptions, serve_coordinator
+    from catseye.service.display import LogOptions
 
     within("clock_offset_s", clock_offset_s, -MOST_OFFSET_S, MOST_OFFSET_S)
-    given = coordinator_orders(**orders)
-    records = read_site_of(site)
-    peers = _peers(records, port_base, loopback, addresses, feed, motion_script)
-    log = LogOptions(tell, log_json, screen)
-    return serve_coordinator(records, given, peers, offset=clock_offset_s, log_options=log)
+
+    def assembled() -> "ServedSite":
+        from catseye.service.serving import ServedSite
+
+        given = coordinator_orders(**orders)
+        records = read_site_of(site)
+        peers = _peers(records, port_base, loopback, addresses, feed, motion_script)
+        return ServedSite(records, given, peers, offset=clock_offset_s, log_options=options)
+
+    options = LogOptions(tell, log_json, screen)
+    return _served(str(site), assembled, options)
 
 
 @with_units
@@ -212,25 +231,19 @@ def serve(
 
     Raises InputError and ArgumentError as `ziy`.
     """
-    from catseye.service.serving import LogOptions, serve_coordinator
-    from catseye.service.simulation import twin_arguments
+    from catseye.service.display import LogOptions
+    from catseye.service.twin_process import TwinProcess, twin_arguments
 
     if twin and port_base == 0:
         raise ArgumentError("port_base: a twin that is restarted needs ports that stay (expected above 0)", "port_base")
     if twin and (loopback or addresses is not None or feed is not None or motion_script is not None):
         names = ("twin", "loopback", "addresses", "feed", "motion_script")
         raise ArgumentError("twin brings its rangers and its feed: no loopback, addresses, feed, motion_script", *names)
-    options, given = twin_options(seed, motion, conditions, faults), coordinator_orders(**orders)
-    world = twin_world(start_mjd, 0.0 if start_mjd is None else None, options)
-    records = read_site_of(site)
-    peers = _peers(records, port_base, loopback, addresses, feed, motion_script)
-    if twin:
-        world.twin(records)  # an impossible twin is refused here
+    world = twin_world(start_mjd, 0.0 if start_mjd is None else None, twin_options(seed, motion, conditions, faults))
 
     beside = None
     if page:
         beside = site_page(
-            {"site": str(site), "journal": given.journal, "rangers": peers.rangers},
             host=page_host,
             port=page_port,
             certificate=page_certificate,
@@ -241,47 +254,62 @@ def serve(
             at_once=screen,
         )
 
-    return serve_coordinator(
-        records,
-        given,
-        peers,
-        offset=world.offset if twin else 0.0,
-        seed=seed if twin else None,
-        log_options=LogOptions(tell, log_json, screen),
-        beside=_children(
-            twin_arguments(str(site), world, port_base) if twin else None, len(peers.rangers), beside, given.host
-        ),
-    )
+    def assembled() -> "ServedSite":
+        from catseye.service.serving import ServedSite
+
+        given = coordinator_orders(**orders)
+        records = read_site_of(site)
+        peers = _peers(records, port_base, loopback, addresses, feed, motion_script)
+        if twin:
+            world.twin(records)  # an impossible twin is refused here
+        return ServedSite(
+            records,
+            given,
+            peers,
+            offset=world.offset if twin else 0.0,
+            seed=seed if twin else None,
+            log_options=options,
+            beside=None if beside is None else beside.children(str(site), given, peers),
+        )
+
+    options = LogOptions(tell, log_json, screen)
+    process = TwinProcess(twin_arguments(str(site), world, port_base), patient=True) if twin else None
+    return _served(str(site), assembled, options, process)
 
 
-def _children(
-    twin: Sequence[str] | None, rangers: int, page: SitePage | None, host: str
-) -> "Callable[[LiveLog, asyncio.Future[int]], Coroutine[Any, Any, None]] | None":
-    """Coroutine function that keeps the children of a site; None without any.
+def _served(
+    name: str, assembled: "Callable[[], ServedSite]", options: "LogOptions", twin: "TwinProcess | None" = None
+) -> "SiteEnd":
+    """End of a site served until a signal.
 
-    twin      arguments of the twin's process
-    rangers   their number, for people
-    host      of the coordinator's own port
+    assembled   makes it: what it needs is imported and read meanwhile in a thread
+    twin        started before
     """
-    from catseye.service.child import LiveChild
+    from catseye.errors import CatseyeError
+    from catseye.service.running import LiveRun, SiteEnd
 
-    if twin is None and page is None:
-        return None
+    made: list[ServedSite] = []
 
-    async def children(log: "LiveLog", own_port: "asyncio.Future[int]") -> None:
-        async with asyncio.TaskGroup() as tasks:
+    async def work() -> None:
+        options.view.open(name)
+        async with twin or nullcontext():
             if twin is not None:
-                child = LiveChild(
-                    "twin",
-                    twin,
-                    said=lambda line: log.tell("twin", "listens", f"{rangers} rangers and the feed listen"),
-                    warned=lambda line: log.tell("twin", "child", line, "warning"),
-                )
-                tasks.create_task(child.keep(patient=True))
-            if page is not None:
-                tasks.create_task(page.keep(log, (host, await own_port)))
+                twin.progress = options.view.progress
+            with uncollected():
+                made.append(await asyncio.to_thread(assembled))
+            await made[0].run(twin)
 
-    return children
+    run: LiveRun[None] = LiveRun(work)
+    try:
+        run.result()
+    except CatseyeError as problem:
+        if not (options.json and made):
+            raise
+        made[0].log.tell("coordinator", "failed", str(problem), "alarm")
+        return SiteEnd(failed=True)
+    finally:
+        options.view.end()
+    return SiteEnd(run.signal, journal=made[0].journal_end if made else None)
 
 
 def coordinator_orders(

@@ -155,6 +155,7 @@ class Coordinator:
         self.feed = self._listening(*feed, environment) if isinstance(feed, tuple) else None
         self.posture: LivePosture | None = None
         self.round_number = 0
+        self.round_ticks: tuple[int, int] | None = None  # begin and end of the last planned round
         self.answer: EpochAnswer | None = None
         self._solving: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
@@ -275,6 +276,7 @@ class Coordinator:
             if planned is not None:
                 self.round_number += 1
                 self.planned = planned
+                self.round_ticks = now_ticks, planned.end_ticks
                 self.firing.begin(planned)
             if not stopped:
                 self.firing.begin_streams()

@@ -100,34 +100,16 @@ def cube_places_mm(site: SiteFolder, ranger: str) -> dict[str, NDArray[np.float6
 
     In the ranger's frame, for the site's posture.
     """
-    return _in_own_frame(site, ranger, places_of(site))
+    at = _in_frame(site, frame_of(site, ranger), places_of(site))
+    return {name: place for name, place in at.items() if name != ranger}
 
 
-def cubes_commands(
-    site: SiteFolder,
-    ranger: str,
-    targets: Iterable[str] | None = None,
-    *,
-    places: Mapping[str, RangedPoint] | None = None,
-) -> list[Request]:
+def cubes_commands(site: SiteFolder, ranger: str, targets: Iterable[str] | None = None) -> list[Request]:
     """INI, then COO and KND of the targets but ZRG and itself.
 
     targets   names; None: all
-    places    of the site, if already computed
     """
-    numbers, places = cube_numbers(site), places or places_of(site)
-    at = _in_own_frame(site, ranger, places)
-    certified = {b.target: b.certified_distance_mm for b in site.benchmarks if b.ranger == ranger}
-    commands = [_command("INI", len(numbers) - 1)]
-    for name in sorted(at) if targets is None else [t for t in targets if t not in (REFERENCE, ranger)]:
-        if name not in at:
-            raise InputError(f"unknown target {name} (expected one of the site's {len(at)} targets)")
-        commands.append(_command("COO", numbers[name], *(f"{v:.3f}" for v in at[name]), name))
-        if name in certified:
-            commands.append(_command("KND", numbers[name], "B", f"{certified[name]:.4f}"))
-        elif places[name].constant != 0.0:
-            commands.append(_command("KND", numbers[name], "S", f"{places[name].constant / MILLIMETRE:.4f}"))
-    return commands
+    return SiteCommands(site).of_cubes(ranger, targets)
 
 
 def monument_commands(site: SiteFolder, ranger: str) -> list[Request]:
@@ -164,40 +146,75 @@ def commands_of_ranger(site: SiteFolder, ranger: str, targets: Iterable[str] | N
 
     Raises InputError: no such ranger or target, or more targets than a ranger has room for.
     """
-    return [
-        *monument_commands(site, ranger),
-        *head_commands(site, ranger),
-        *cubes_commands(site, ranger, targets),
-    ]
+    return SiteCommands(site).of_ranger(ranger, targets)
 
 
-def files_of_ranger(
-    site: SiteFolder, ranger: str, *, places: Mapping[str, RangedPoint] | None = None
-) -> dict[str, str]:
-    """Initialisation files: text by name, in INITZY's order.
+class SiteCommands:
+    """Initialisation commands of all rangers of a site.
 
-    They are CUBES.INI, ZYnnn.INI and the head's file.
-
-    places   of the site, if already computed
-
-    Ground rangers share their CUBES.INI except for benchmarks, and that none is its own target.
+    Thousands of cubes are the same on each ranger of a frame: theirs are made once, and shared.
     """
-    zp = site.mirror_of(ranger).zp
-    frame = frame_of(site, ranger)
-    cubes = cubes_commands(site, ranger, places=places)
-    return {
-        "CUBES.INI": _text(f"targets of {site.site.campaign.name}, {frame} frame", cubes),
-        f"{ranger.upper()}.INI": _text(f"mount of {ranger}, {frame} frame", monument_commands(site, ranger)),
-        f"{zp.lower()}.INI": _text(f"head and mirror {zp}", head_commands(site, ranger)),
-    }
+
+    def __init__(self, site: SiteFolder):
+        self._site, self._places, self._numbers = site, places_of(site), cube_numbers(site)
+        self._placed: dict[Frame, dict[str, Request]] = {}
+        self._constants = {
+            name: _command("KND", self._numbers[name], "S", f"{place.constant / MILLIMETRE:.4f}")
+            for name, place in self._places.items()
+            if place.constant != 0.0
+        }
+
+    def of_cubes(self, ranger: str, targets: Iterable[str] | None = None) -> list[Request]:
+        """Commands as `cubes_commands` gives them."""
+        at, numbers = self._cubes(frame_of(self._site, ranger)), self._numbers
+        certified = {b.target: b.certified_distance_mm for b in self._site.benchmarks if b.ranger == ranger}
+        commands = [_command("INI", len(numbers) - 1)]
+        for name in at if targets is None else targets:
+            if name in (REFERENCE, ranger):
+                continue
+            if name not in at:
+                raise InputError(f"unknown target {name} (expected one of the site's {len(at) - 1} targets)")
+            commands.append(at[name])
+            if name in certified:
+                commands.append(_command("KND", numbers[name], "B", f"{certified[name]:.4f}"))
+            elif name in self._constants:
+                commands.append(self._constants[name])
+        return commands
+
+    def of_ranger(self, ranger: str, targets: Iterable[str] | None = None) -> list[Request]:
+        """Commands as `commands_of_ranger` gives them."""
+        cubes = self.of_cubes(ranger, targets)
+        return [*monument_commands(self._site, ranger), *head_commands(self._site, ranger), *cubes]
+
+    def files(self, ranger: str) -> dict[str, str]:
+        """Initialisation files: text by name, in INITZY's order.
+
+        They are CUBES.INI, ZYnnn.INI and the head's file. Ground rangers share their CUBES.INI except for benchmarks,
+        and that none is its own target.
+        """
+        site, zp, frame = self._site, self._site.mirror_of(ranger).zp, frame_of(self._site, ranger)
+        return {
+            "CUBES.INI": _text(f"targets of {site.site.campaign.name}, {frame} frame", self.of_cubes(ranger)),
+            f"{ranger.upper()}.INI": _text(f"mount of {ranger}, {frame} frame", monument_commands(site, ranger)),
+            f"{zp.lower()}.INI": _text(f"head and mirror {zp}", head_commands(site, ranger)),
+        }
+
+    def _cubes(self, frame: Frame) -> dict[str, Request]:
+        """COO by target, in the alphabet's order, of a frame's rangers."""
+        if frame not in self._placed:
+            at = _in_frame(self._site, frame, self._places)
+            self._placed[frame] = {
+                name: _command("COO", self._numbers[name], *(f"{v:.3f}" for v in at[name].tolist()), name)
+                for name in sorted(at)
+            }
+        return self._placed[frame]
 
 
-def _in_own_frame(site: SiteFolder, ranger: str, places: Mapping[str, RangedPoint]) -> dict[str, NDArray[np.float64]]:
-    names = [name for name in places if name != ranger]
-    points = np.array([places[name].start for name in names])
-    if frame_of(site, ranger) == "reflector":
+def _in_frame(site: SiteFolder, frame: Frame, places: Mapping[str, RangedPoint]) -> dict[str, NDArray[np.float64]]:
+    points = np.array([place.start for place in places.values()])
+    if frame == "reflector":
         points = nominal_frame(site).inverse().points(points)
-    return dict(zip(names, points / MILLIMETRE, strict=True))
+    return dict(zip(places, points / MILLIMETRE, strict=True))
 
 
 def _motion(mirror: Mirror, axis: int) -> list[Request]:

@@ -12,6 +12,7 @@ greeting included, carries TID and stamp; a greeting without them is accepted, t
 """
 
 import re
+from collections.abc import Container
 from dataclasses import dataclass
 
 import numpy as np
@@ -218,11 +219,12 @@ def format_reply(reply: Reply) -> str:
     return line
 
 
-def commands_of_file(text: str, name: str) -> list[tuple[int, Request]]:
+def commands_of_file(text: str, name: str, skipped: Container[str] = ()) -> list[tuple[int, Request]]:
     """Commands of an initialisation file with line numbers, without comments.
 
-    text   of the file
-    name   of the file, for messages
+    text      of the file
+    name      of the file, for messages
+    skipped   lines that are not read
 
     Raises InputError with the unreadable line.
 
@@ -231,6 +233,8 @@ def commands_of_file(text: str, name: str) -> list[tuple[int, Request]]:
     """
     commands = []
     for number, line in enumerate(text.splitlines(), 1):
+        if line in skipped:
+            continue
         try:
             request = parse_request(line.partition(";")[0].strip())
         except InputError as problem:

@@ -15,7 +15,7 @@ from catseye.errors import InputError
 from catseye.interruption import undo_on_interruption
 
 PROGRAM = (sys.executable, "-P", "-m", "catseye")
-LONGEST_START = 120.0  # s until the child's first line: its kernels are compiled the first time
+LONGEST_START = 120.0  # s until the child is up: its kernels are compiled the first time
 LONGEST_LEAVE = 1.0  # s from SIGTERM until it is killed: the parent has to exit within five
 FIRST_WAIT, LONGEST_WAIT, LIVED = 1.0, 30.0, 60.0  # s of back-off before a restart, doubled unless it ran for LIVED
 LineHandler = Callable[[str], None]
@@ -30,6 +30,9 @@ class LiveChild:
     warned     called with each line of its standard error
     program    that takes the arguments
     first_line called at each start for the first line on its standard input; None: it gets none
+    is_up      True for the line of its output by which it has started; the first one by default
+
+    `ended` is called when it has ended, or could not start.
     """
 
     def __init__(
@@ -41,13 +44,16 @@ class LiveChild:
         warned: LineHandler,
         program: Sequence[str] = PROGRAM,
         first_line: Callable[[], str] | None = None,
+        is_up: Callable[[str], bool] = lambda line: True,
     ):
+        self._is_up = is_up
+        self.ended: Callable[[], None] = lambda: None
         self._program, self._first_line = tuple(program), first_line
         self.name, self._arguments, self._said, self._warned = name, tuple(arguments), said, warned
         self._process: asyncio.subprocess.Process | None = None
         self._readers: list[asyncio.Task[None]] = []
         self._last_warning = ""
-        self._output_seen = asyncio.Event()
+        self._up = asyncio.Event()
 
     @property
     def pid(self) -> int | None:
@@ -55,11 +61,11 @@ class LiveChild:
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Start it and wait for its first line.
+        """Start it and wait until it is up.
 
         Raises InputError if it exits before, with its last message, or takes too long.
         """
-        self._output_seen.clear()
+        self._up.clear()
         self._last_warning = ""
         self._process = await asyncio.create_subprocess_exec(
             *self._program,
@@ -76,16 +82,16 @@ class LiveChild:
         ]
         if self._first_line is not None and process.stdin is not None:
             process.stdin.write(self._first_line().encode() + b"\n")  # buffered: a child that has ended is seen below
-        exit_task, output_task = asyncio.create_task(process.wait()), asyncio.create_task(self._output_seen.wait())
+        exit_task, up_task = asyncio.create_task(process.wait()), asyncio.create_task(self._up.wait())
         try:
-            await asyncio.wait([exit_task, output_task], timeout=LONGEST_START, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait([exit_task, up_task], timeout=LONGEST_START, return_when=asyncio.FIRST_COMPLETED)
         finally:
             exit_task.cancel()
-            output_task.cancel()
-        if self._output_seen.is_set():
+            up_task.cancel()
+        if self._up.is_set():
             return
         await self.stop()
-        why = self._last_warning.removeprefix("catseye: ") or f"no output for {LONGEST_START:g} s"
+        why = self._last_warning.removeprefix("catseye: ") or f"it has not started within {LONGEST_START:g} s"
         raise InputError(f"{self.name}: {why}")
 
     async def keep(self, *, patient: bool = False) -> None:
@@ -103,6 +109,7 @@ class LiveChild:
                 while True:
                     started = loop.time()
                     status = await self._process.wait() if self._process is not None else None
+                    self.ended()
                     wait = FIRST_WAIT if loop.time() - started > LIVED else wait
                     what = "did not start" if self._process is None else f"ended with status {status}"
                     self._warned(f"{what}; restarting in {wait:g} s")
@@ -143,7 +150,8 @@ class LiveChild:
 
     def _hear(self, line: str) -> None:
         self._said(line)
-        self._output_seen.set()
+        if self._is_up(line):
+            self._up.set()
 
     def _warn(self, line: str) -> None:
         self._last_warning = line

@@ -3,7 +3,7 @@
 import asyncio
 import gc
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -30,6 +30,7 @@ from catseye.errors import InputError
 from catseye.memory import keep_heap_small
 from catseye.ranger.addresses import COORDINATOR_PORT
 from catseye.ranger.door import Door
+from catseye.ranger.initialisation import SiteCommands
 from catseye.ranger.network import NO_TLS, ConnectionMaker, Sockets, TlsFiles
 from catseye.ranger.server import LOOPBACK
 from catseye.records.files.reading import read_record
@@ -43,7 +44,6 @@ from catseye.records.site.validity import expired, expired_of_site
 from catseye.reduction.live.live import Live, LiveSettings
 from catseye.service.settings import settings_object
 from catseye.service.solver import SolverProcess
-from catseye.service.warm import initialising_commands
 
 SWITCH = 0.0005  # s, thread switch interval: epochs are solved beside the loop, which must not wait for them
 GROUP = 0.0005  # s that a commit waits for more entries; those received during a commit are in the next
@@ -198,7 +198,7 @@ class LiveCoordinator:
             environment=Environment(clock, network or Sockets(orders.tls), seed or 0, orders.key),
             feed=peers.feed,
             mode=orders.mode,
-            commands=initialising_commands(site),
+            commands=SiteCommands(site).of_ranger,
         )
         files = {orders.keep_out: keep_clear.keep_out, orders.interlocks: locks, orders.solids: solids}
         self._certificates: dict[str, Certificate] = {
@@ -284,8 +284,13 @@ class LiveCoordinator:
         """Process id of the solver."""
         return None if self._solver is None else self._solver.pid
 
-    async def run(self, started: Callable[[], None] = lambda: None) -> None:
+    async def run(
+        self, started: Callable[[], None] = lambda: None, ready: Callable[[], Awaitable[None]] | None = None
+    ) -> None:
         """Measure until cancelled; then switch everything off within five seconds.
+
+        started   called when its own port answers
+        ready     awaited before it connects to the rangers: they start beside it
 
         Raises InputError if its own port is not available.
         """
@@ -303,6 +308,8 @@ class LiveCoordinator:
                 loading = asyncio.gather(self._start_solver(self._solver), asyncio.to_thread(_load_kernel))
                 gc.collect()
                 gc.freeze()  # a full collection of a site with thousands of records takes 40 ms
+            if ready is not None:
+                await ready()
             await self.ziy.run()
         finally:
             if watching is not None:

@@ -6,44 +6,31 @@ import importlib
 import logging
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from catseye.aliases import Progress
 from catseye.clock import Clock
 from catseye.errors import CatseyeError, InputError
-from catseye.ranger.addresses import PORT_BASE, Address, Addresses, feed_address
+from catseye.memory import uncollected
+from catseye.ranger.addresses import PORT_BASE, Addresses, feed_address
 from catseye.ranger.door import DEFAULT_ACCESS, Door
 from catseye.ranger.head import RangerHead
 from catseye.ranger.network import NO_TLS, ConnectionMaker, SocketListener, Sockets, TlsFiles
 from catseye.ranger.ranger import Ranger
 from catseye.records.site.folder import SiteFolder
+from catseye.service.listening import Listening
+from catseye.service.running import LiveRun, SiteEnd
 from catseye.service.warm import WarmingClock, warm
+from catseye.service.watchdog import live
 from catseye.simulator.twin.faults import FaultBoard
 from catseye.simulator.twin.feed import SiteFeed
 from catseye.simulator.twin.servers import TwinSite
 from catseye.simulator.twin.site import Twin
 
 LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Listening:
-    """Addresses of what is served.
-
-    Host and both ports of each ranger; host and port of the feed, if any.
-    """
-
-    rangers: Mapping[str, Address]
-    feed: tuple[str, int] | None = None
-
-    def plain(self) -> dict[str, Any]:
-        """Addresses of rangers and feed as an object for JSON."""
-        return {
-            "rangers": {name: list(at) for name, at in self.rangers.items()},
-            "feed": None if self.feed is None else list(self.feed),
-        }
 
 
 class DeferredSockets(Sockets):
@@ -152,33 +139,51 @@ class RangersServed:
         """Rangers served, by name."""
         return self._served.rangers
 
-    async def serve(self, listening: Callable[[Listening], None]) -> None:
+    async def serve(
+        self,
+        listening: Callable[[Listening], None],
+        *,
+        bound: Callable[[Listening], None] = lambda at: None,
+        progress: Progress = lambda what, done, total: None,
+    ) -> None:
         """Listen, report the addresses, and serve until cancelled.
+
+        listening   called with the addresses when they answer
+        bound       called with them when the ports are taken, before the rangers are made ready
+        progress    called with the number of rangers that are ready
 
         Raises InputError if a port or a folder is not available.
         """
         try:
-            await self._served.start()
-            if self._warming is not None and self._twin is not None:
-                posture = self._twin.live_posture
-                for text in await warm(self._site, self._served.rangers, self._warming, posture=posture):
-                    self.warned(text)
-            self._served.rearm()  # the warm-up does not count for the dead-man switch
-            if self._late is not None:
-                await self._late.open()
-            at = None
-            if self._feed is not None:
-                await self._feed.start(*self._feed_at)
-                at = (self._feed_at[0], self._feed.port)
+            with uncollected():
+                at = await self._made_ready(bound, progress)
             gc.collect()
             gc.freeze()  # thousands of cubes a ranger: a full collection takes 100 ms without answers
-            listening(Listening(dict(self._served.addresses), at))
+            listening(at)
             await asyncio.gather(self._served.serve(), *([] if self._feed is None else [self._feed.serve()]))
         finally:
             if self._feed is not None:
                 await self._feed.stop()
             await self._served.stop()
             gc.unfreeze()
+
+    async def _made_ready(self, bound: Callable[[Listening], None], progress: Progress) -> Listening:
+        """Addresses of ports that answer, of rangers that are ready."""
+        await self._served.start()
+        feed = None
+        if self._feed is not None:
+            await self._feed.start(*self._feed_at)
+            feed = (self._feed_at[0], self._feed.port)
+        at = Listening(dict(self._served.addresses), feed)
+        bound(at)
+        if self._warming is not None and self._twin is not None:
+            posture, rangers = self._twin.live_posture, self._served.rangers
+            for text in await warm(self._site, rangers, self._warming, posture=posture, progress=progress):
+                self.warned(text)
+        self._served.rearm()  # the warm-up does not count for the dead-man switch
+        if self._late is not None:
+            await self._late.open()
+        return at
 
 
 def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
@@ -212,3 +217,49 @@ def heads_of(factory: str, rangers: tuple[str, ...]) -> dict[str, RangerHead]:
             raise InputError(f"head {factory}: the object for {ranger} has no {missing[0]} (expected a Head)")
         heads[ranger] = head
     return heads
+
+
+def serve_rangers(
+    served: RangersServed,
+    listening: Callable[[Listening], None],
+    *,
+    leave_with_stdin: bool,
+    bound: Callable[[Listening], None] = lambda at: None,
+    progress: Progress = lambda what, done, total: None,
+) -> SiteEnd:
+    """Serve rangers until a signal.
+
+    listening, bound, progress   as of `RangersServed.serve`
+    leave_with_stdin             True to end when standard input does, as a child of `LiveChild`
+    """
+
+    def serve() -> Coroutine[Any, Any, None]:
+        return _served(served.serve(listening, bound=bound, progress=progress), leave_with_stdin)
+
+    run: LiveRun[None] = LiveRun(serve)
+    run.result()
+    return SiteEnd(run.signal)
+
+
+async def _served(serving: Coroutine[Any, Any, None], with_stdin: bool) -> None:
+    work = asyncio.ensure_future(serving)
+    living = None if with_stdin else asyncio.ensure_future(live())  # a child's parent notifies the service manager
+    if with_stdin:
+        loop = asyncio.get_running_loop()
+
+        def readable() -> None:
+            if not os.read(sys.stdin.fileno(), 4096):
+                loop.remove_reader(sys.stdin)
+                work.cancel()
+
+        loop.add_reader(sys.stdin, readable)
+    try:
+        await work
+    except asyncio.CancelledError:
+        work.cancel()
+        if living is not None:
+            living.cancel()
+        await asyncio.gather(work, return_exceptions=True)
+        task = asyncio.current_task()
+        if task is not None and task.cancelling():
+            raise

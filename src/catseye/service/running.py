@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Generic, TypeVar
 
@@ -13,6 +14,20 @@ from catseye.simulator.clock.virtual_time import VirtualLoop
 T = TypeVar("T")
 LONGEST_END = 4.0  # s from the signal until a forced exit: within five in all, with ten other processes running
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
+
+
+@dataclass(frozen=True)
+class SiteEnd:
+    """End of a site that was served.
+
+    signal    number of the signal that ended it; 0 for none
+    failed    True if an error ended it, which its log reported
+    journal   last head of the journal's chain and its run; None without a journal
+    """
+
+    signal: int = 0
+    failed: bool = False
+    journal: str | None = None
 
 
 class FastLoop(VirtualLoop):

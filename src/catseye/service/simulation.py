@@ -1,24 +1,25 @@
 """Simulated site: twin and coordinator, epochs compared with the truth."""
 
 import asyncio
-import json
 from collections.abc import Coroutine
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from catseye.coordinator.journal.chain import Head
 from catseye.coordinator.link.settings import Address
 from catseye.errors import InputError
-from catseye.ranger.addresses import PORT_BASE
+from catseye.memory import uncollected
 from catseye.records.site.folder import SiteFolder
 from catseye.service.book import RunSummary
-from catseye.service.child import LiveChild
 from catseye.service.comparison import TwinComparison
 from catseye.service.coordinator import LiveCoordinator, Orders, Peers
 from catseye.service.found import FaultFinder
-from catseye.service.rangers import Listening, RangersServed
+from catseye.service.listening import Listening
+from catseye.service.rangers import RangersServed
 from catseye.service.running import FastLoop
+from catseye.service.twin_process import TwinProcess
+from catseye.service.views import RunControls, View
 from catseye.service.warm import WarmingClock
 from catseye.service.world import TwinWords, twin_heads
 from catseye.simulator.clock.virtual_time import MemoryNetwork, VirtualClock
@@ -27,45 +28,23 @@ LONGEST_QUIET = 120.0  # s until the first round: cold rangers take half a minut
 LOOK = 0.1  # s
 
 
-class View(Protocol):
-    """Display of a simulation."""
-
-    def tell(self, text: str) -> None:
-        """Show a message during the start."""
-        ...
-
-    def begin(self, book: RunSummary, running: LiveCoordinator) -> None:
-        """Begin to show a coordinator."""
-        ...
-
-    def entry(self, entry: Any) -> None:
-        """Show a durable entry that the book has."""
-        ...
-
-    def end(self) -> None:
-        """Stop: no more entries will come."""
-        ...
-
-
 @dataclass
 class Simulation:
     """One simulation; afterwards results are in `book`, `seconds`, `told`, `head`.
 
-    site, name   its records, and the user's name of it
+    site         its records
     world        of the twin
     orders       of the coordinator
     minutes      of measuring; 0: for ever
-    port_base    of rangers and feed; 0: any free ports
-    warm         True to initialise and home the rangers before anybody connects
+    view         where it is shown
+    warm         True to initialise and home the rangers before anybody connects; in virtual time
     """
 
     site: SiteFolder
-    name: str
     world: TwinWords
     orders: Orders
     minutes: float
     view: View
-    port_base: int = PORT_BASE
     warm: bool = True
     seconds: float = 0.0
     told: int = 0  # shots reported by rangers, durable or not
@@ -73,6 +52,8 @@ class Simulation:
 
     def __post_init__(self) -> None:
         self._twin = self.world.twin(self.site)
+        self._start: float | None = None  # of measuring, by the loop's clock
+        self._ended = asyncio.Event()  # by a person
         self.book = RunSummary()
 
     @property
@@ -81,26 +62,14 @@ class Simulation:
         rangers = set(self.site.rangers) - set(self.orders.drop)
         return {"seconds": self.seconds, "rangers": len(rangers), "told": self.told, "head": self.head}
 
-    async def run(self) -> None:
+    async def run(self, twin: TwinProcess) -> None:
         """Run in real time, the twin in its own process, until finished or cancelled.
 
         Raises InputError if a port or a journal is not available.
         """
-        addresses: asyncio.Queue[Listening] = asyncio.Queue()
-        child = LiveChild(
-            "twin",
-            [*twin_arguments(self.name, self.world, self.port_base), *([] if self.warm else ["--cold"])],
-            said=lambda line: addresses.put_nowait(listening_of(line)),
-            warned=lambda line: self.view.tell(f"twin: {line}"),
-        )
-        self.view.tell("starting the twin")
-        twin = asyncio.create_task(child.keep())
-        try:
-            at = await _first(addresses.get(), twin)
-            self.view.tell("starting the coordinator")
-            await self._measure(peers_of(at), self.world.clock(), None, twin)
-        finally:
-            await _cancelled(twin)
+        at = await _first(twin.bound(), twin.task)
+        self.view.tell("starting the coordinator")
+        await self._measure(peers_of(at), self.world.clock(), None, twin.task, twin)
 
     async def run_fast(self) -> None:
         """Run in virtual time, all in this process; needs a `FastLoop`.
@@ -114,7 +83,6 @@ class Simulation:
         warming = WarmingClock(clock)
         names = self.site.rangers
         addresses: asyncio.Queue[Listening] = asyncio.Queue()
-        self.view.tell("starting the twin")
         served = RangersServed(
             self.site,
             twin_heads(self._twin, names, warming if self.warm else clock),
@@ -123,11 +91,11 @@ class Simulation:
             network=network,
             warming=warming if self.warm else None,
         )
-        twin = asyncio.create_task(served.serve(addresses.put_nowait))
+        twin = asyncio.create_task(served.serve(addresses.put_nowait, progress=self.view.progress))
         try:
             at = await _first(addresses.get(), twin)
             self.view.tell("starting the coordinator")
-            await self._measure(peers_of(at), clock, network, twin)
+            await self._measure(peers_of(at), clock, network, twin, None)
         finally:
             await _cancelled(twin)
 
@@ -137,71 +105,62 @@ class Simulation:
         clock: Any,
         network: MemoryNetwork | None,
         twin: "asyncio.Task[None]",
+        process: TwinProcess | None,
     ) -> None:
-        running = LiveCoordinator(
-            self.site,
-            self.orders,
-            peers,
-            clock=clock,
-            seed=self.world.seed,
-            network=network,
-            virtual=network is not None,
-            tell=lambda kind, text, severity: self.view.tell(text) if kind == "journal" else None,
-        )
+        with uncollected():
+            running = LiveCoordinator(
+                self.site,
+                self.orders,
+                peers,
+                clock=clock,
+                seed=self.world.seed,
+                network=network,
+                virtual=network is not None,
+                tell=lambda kind, text, severity: self.view.tell(text) if kind == "journal" else None,
+            )
         after = running.settings.reference_after
         finder = FaultFinder(self.world.faults, self.world.start_mjd)
         self.book = RunSummary(TwinComparison(self.site, self._twin, reference_after=after), finder)
         running.ziy.listeners.append(self._entry)
-        self.view.begin(self.book, running)
-        coordinator = asyncio.create_task(running.run())
+        controls = RunControls(
+            stop=self._ended.set,
+            span=self._span,
+            may_pause=network is None,
+            starting=lambda: process is not None and process.starting,
+        )
+        coordinator = asyncio.create_task(running.run(ready=None if process is None else process.settled))
         try:
+            self.view.begin(self.book, running, controls)
             await _first(self._time(running), twin, coordinator)
         finally:
+            self.view.end()  # with the picture of a site that measures
             await _cancelled(coordinator)
             self.told = running.ziy.intake.numbered
             self.head = running.journal_head
-            self.view.end()
 
     async def _time(self, running: LiveCoordinator) -> None:
-        """Wait until the minutes are over, counted from the first round."""
+        """Wait until the minutes are over, counted from the first round, or a person ends it."""
         loop = asyncio.get_running_loop()
         start = loop.time()
-        while not running.ziy.round_number and running.orders.mode == "active":
+        while not running.ziy.round_number and running.ziy.mode == "active" and not self._ended.is_set():
             if loop.time() - start > LONGEST_QUIET:
                 raise InputError(f"no round could be planned for {LONGEST_QUIET:g} s (see the rangers' messages)")
             await asyncio.sleep(LOOK)
-        start = loop.time()
+        self._start = loop.time()
         try:
-            while not self.minutes or loop.time() - start < 60.0 * self.minutes:
+            while not self._ended.is_set() and (not self.minutes or loop.time() - self._start < 60.0 * self.minutes):
                 await asyncio.sleep(LOOK)
         finally:
-            self.seconds = loop.time() - start
+            self.seconds = loop.time() - self._start
+
+    def _span(self) -> tuple[float, float | None]:
+        """Time of measuring so far, and to come, s; None: without end."""
+        passed = 0.0 if self._start is None else asyncio.get_running_loop().time() - self._start
+        return passed, 60.0 * self.minutes - passed if self.minutes else None
 
     def _entry(self, entry: Any) -> None:
         self.book.entry(entry)
         self.view.entry(entry)
-
-
-def twin_arguments(name: str, world: TwinWords, port_base: int) -> list[str]:
-    """Arguments of `catseye` for a child that serves a twin's rangers.
-
-    It reports its addresses in one JSON line.
-    """
-    return ["zy", name, *world.options(), f"--port-base={port_base}", "--json", "--leave-with-stdin"]
-
-
-def listening_of(line: str) -> Listening:
-    """Addresses in a child's first line.
-
-    Raises InputError for any other line.
-    """
-    try:
-        stored = json.loads(line)
-        rangers = {str(name): (str(host), int(a), int(b)) for name, (host, a, b) in stored["rangers"].items()}
-        feed = None if stored["feed"] is None else (str(stored["feed"][0]), int(stored["feed"][1]))
-    except (ValueError, KeyError, TypeError) as problem:
-        raise InputError(f"the twin printed {line[:80]!a} (expected its addresses)") from problem
-    return Listening(rangers, feed)
 
 
 def peers_of(at: Listening) -> Peers:

@@ -5,21 +5,24 @@ with it would show little else in its first minute, so the head's clock is advan
 """
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 
+from catseye.aliases import Progress
 from catseye.clock import Clock
 from catseye.coordinator.guard.guard import SafetyGuard
 from catseye.coordinator.link.preparation import Preparation
 from catseye.errors import InputError
 from catseye.geometry.sky.time_tag import PER_DAY, PER_SECOND, utc_text
-from catseye.ranger.initialisation import cubes_commands, head_commands, monument_commands
+from catseye.ranger.cubes import Cube
+from catseye.ranger.initialisation import SiteCommands
 from catseye.ranger.line import FIRST_CLIENT_TID, Reply, Request, format_request, nanoseconds_to_ticks
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.sun_watch import sun_departure_mjd
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import SiteFolder
-from catseye.reduction.site.places import places_of
+from catseye.service.listening import STEP_NAME
 
 BEFORE = 300.0  # s before the start, when the rangers are powered on
 STEP = 0.05  # s between two polls of a busy ranger
@@ -63,40 +66,30 @@ class WarmingClock:
         self._now = None
 
 
-def initialising_commands(site: SiteFolder) -> Callable[[str], list[Request]]:
-    """Function from a ranger to its initialisation commands.
-
-    As `ranger.initialisation.commands_of_ranger`, with the site's positions computed once.
-    """
-    places = places_of(site)
-
-    def commands(ranger: str) -> list[Request]:
-        cubes = cubes_commands(site, ranger, places=places)
-        return [*monument_commands(site, ranger), *head_commands(site, ranger), *cubes]
-
-    return commands
-
-
 async def warm(
-    site: SiteFolder, rangers: Mapping[str, Ranger], clock: WarmingClock, *, posture: Callable[[int], LivePosture]
+    site: SiteFolder,
+    rangers: Mapping[str, Ranger],
+    clock: WarmingClock,
+    *,
+    posture: Callable[[int], LivePosture],
+    progress: Progress = lambda what, done, total: None,
 ) -> list[str]:
     """Make unconnected rangers ready, as a coordinator would have left them.
 
     clock     of their heads; released at the end
     posture   telescope position at ticks: with it each ranger gets the Sun's direction
+    progress  called with the number of rangers done, before the first and after each
 
     A ranger that cannot be made ready is left dark and reported here in a line: its mirror looks at the Sun and no way
     out is free, or an index is not found. The others serve; a client can make it ready later.
 
     Raises InputError: a command of the records is refused.
     """
-    commands, guard = initialising_commands(site), SafetyGuard(site)
+    commands, guard, loader = SiteCommands(site), SafetyGuard(site), _Loader()
     problems: list[str] = []
-    for name, ranger in rangers.items():
-        for request in Preparation.of(commands(name)).requests:
-            answer = ranger.work_of(CLIENT, request)
-            if not isinstance(answer, tuple):
-                raise InputError(f"{name}: {request.command} takes time (expected a command that completes at once)")
+    for done, (name, ranger) in enumerate(rangers.items()):
+        progress(STEP_NAME, done, len(rangers))
+        loader.load(ranger, Preparation.of(commands.of_ranger(name)).requests)
         _tell_sun(guard, name, ranger, clock, posture)
         problem = await _homed_and_lit(name, ranger, clock)
         if problem is not None or not ranger.laser_at_boot:
@@ -105,10 +98,43 @@ async def warm(
             problems.append(problem)
         ranger.disconnect(CLIENT)
         await asyncio.sleep(0.0)
+    progress(STEP_NAME, len(rangers), len(rangers))
     clock.release()
     for name, ranger in rangers.items():
         _tell_sun(guard, name, ranger, clock, posture)
     return problems
+
+
+class _Loader:
+    """Commands of the records, given to one ranger after another.
+
+    Rangers of a frame have thousands of equal cubes: a cube that one of them made of the same commands is put into the
+    next one's table.
+    """
+
+    def __init__(self) -> None:
+        self._cubes: dict[tuple[tuple[str, ...], ...], Cube] = {}
+
+    def load(self, ranger: Ranger, requests: Sequence[Request]) -> None:
+        """Give a ranger its commands. Raises InputError: one is refused, or takes time."""
+        for of_one, group in groupby(requests, key=_cube_number):
+            commands = list(group)
+            key = tuple(request.parameters for request in commands)
+            cube = None if of_one is None else self._cubes.get(key)
+            if cube is not None:
+                ranger.cubes.put(cube)
+                continue
+            for request in commands:
+                answer = ranger.work_of(CLIENT, request)
+                if not isinstance(answer, tuple):
+                    raise InputError(f"{ranger.name}: {request.command} takes time (expected one that ends at once)")
+            if of_one is not None:
+                self._cubes[key] = ranger.cubes.by_number[int(of_one)]
+
+
+def _cube_number(request: Request) -> str | None:
+    """Number of the cube that COO or KND sets up; None for another command."""
+    return request.parameters[0] if request.command in ("COO", "KND") else None
 
 
 def _tell_sun(

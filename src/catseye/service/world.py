@@ -1,18 +1,18 @@
 """Options of a twin: equal options make equal truth and time."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from catseye.clock import Clock, SystemClock
-from catseye.coordinator.visibility.vantage import pace_by
 from catseye.errors import InputError
-from catseye.records.site.folder import SiteFolder
 from catseye.simulator.twin.conditions import DEWY_NIGHT, LIVING_NIGHT, WINDY_DAY
 from catseye.simulator.twin.faults import Fault, FaultBoard
-from catseye.simulator.twin.head import HeadBuild, TwinHead
-from catseye.simulator.twin.mirror import MirrorTuning, travel_of
 from catseye.simulator.twin.motion import AxisMotion
-from catseye.simulator.twin.site import Twin
+
+if TYPE_CHECKING:
+    from catseye.records.site.folder import SiteFolder
+    from catseye.simulator.twin.head import TwinHead
+    from catseye.simulator.twin.site import Twin
 
 CONDITIONS = {"night": LIVING_NIGHT, "windy-day": WINDY_DAY, "dewy-night": DEWY_NIGHT}
 MOTION = "track 145.3 45"
@@ -62,11 +62,13 @@ class TwinWords:
         """The clock of the twin's time."""
         return SystemClock(self.offset)
 
-    def twin(self, site: SiteFolder) -> Twin:
+    def twin(self, site: "SiteFolder") -> "Twin":
         """The twin.
 
         Raises InputError: faults on devices that the site does not have, an impossible motion.
         """
+        from catseye.simulator.twin.site import Twin
+
         faults = [Fault.parse(text) for text in self.faults]
         for fault in faults:
             _refuse_stranger(fault, site)
@@ -86,11 +88,15 @@ class TwinWords:
         return ["--twin", *words, *(f"--fault={fault}" for fault in self.faults)]
 
 
-def twin_heads(twin: Twin, rangers: tuple[str, ...], clock: Clock) -> dict[str, TwinHead]:
+def twin_heads(twin: "Twin", rangers: tuple[str, ...], clock: Clock) -> "dict[str, TwinHead]":
     """Simulated heads by ranger.
 
     Their tracks are as fast as the mirror's record, or a ZY's default, permits moves.
     """
+    from catseye.coordinator.visibility.vantage import pace_by
+    from catseye.simulator.twin.head import HeadBuild, TwinHead
+    from catseye.simulator.twin.mirror import MirrorTuning, travel_of
+
     heads = {}
     for name in rangers:
         mirror = twin.site.mirror_of(name)
@@ -102,7 +108,7 @@ def twin_heads(twin: Twin, rangers: tuple[str, ...], clock: Clock) -> dict[str, 
     return heads
 
 
-def _refuse_stranger(fault: Fault, site: SiteFolder) -> None:
+def _refuse_stranger(fault: Fault, site: "SiteFolder") -> None:
     """Refuse a fault on an unknown device: it would have no effect."""
     whom, _, part = fault.whom.partition(":")
     if fault.kind in ("lying-station", "silent-station"):

@@ -85,7 +85,7 @@ def test_without_its_packages_there_is_no_page(monkeypatch, tmp_path):
     monkeypatch.setattr("catseye.service.page.missing_packages", lambda: ("fastapi",))
     said = []
     nothing = {"host": None, "port": 0, "certificate": None, "key": None, "token_file": None, "names": ()}
-    assert beside.site_page({"rangers": {}}, **nothing, announce=said.append, at_once=False) is None
+    assert beside.site_page(**nothing, announce=said.append, at_once=False) is None
     [line] = said
     assert "no page: fastapi not installed" in line
     assert "catseye[web]" in line

@@ -1,51 +1,60 @@
 """The page beside a site that is served."""
 
+import asyncio
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from catseye.api.live.address import PAGE_PORT, Place, page_address, page_words
 
 if TYPE_CHECKING:
+    from catseye.service.coordinator import Orders, Peers
     from catseye.service.logs import LiveLog
-    from catseye.service.page import PageAddress
+    from catseye.service.page import PageAddress, PageSettings
+    from catseye.service.serving import Beside
 
 
 class SitePage:
     """The page beside a site: where it listens, and its child.
 
-    subject    settings of the page, without the coordinator
     announce   called once with the page's line; None: it was said before
     """
 
-    def __init__(self, address: "PageAddress", subject: dict[str, Any], announce: Callable[[str], None] | None):
-        self.address, self._subject, self._announce = address, subject, announce
+    def __init__(self, address: "PageAddress", announce: Callable[[str], None] | None):
+        self.address, self._announce = address, announce
 
-    async def keep(self, log: "LiveLog", coordinator: tuple[str, int]) -> None:
-        """Run the child and restart it whenever it ends, until cancelled.
+    def children(self, site: str, orders: "Orders", peers: "Peers") -> "Beside":
+        """Coroutine function that runs the page's process beside a coordinator and restarts it whenever it ends.
 
-        log           of the site
-        coordinator   its host and port
+        site   folder, or bundled name
         """
         from catseye.service.page import PageChild, reachable
 
-        host, port = coordinator
+        rangers = {name: (each.host, each.ports[1]) for name, each in peers.rangers.items()}  # the first is taken
 
-        def listening(actual: "PageAddress") -> None:
-            log.tell("page", "listens", f"browsers connect to {actual.url()}")
-            if self._announce is not None:
-                self._announce(page_words(actual))
+        async def keep(log: "LiveLog", own_port: "asyncio.Future[int]") -> None:
+            port = await own_port
 
-        page = PageChild(
-            self.address,
-            lambda actual: actual.settings("site", coordinator=(reachable(host), port), **self._subject),
-            listening=listening,
-            warned=lambda line: log.tell("page", "child", line, "warning"),
-        )
-        await page.child.keep(patient=True)
+            def settings(actual: "PageAddress") -> "PageSettings":
+                at = (reachable(orders.host), port)
+                return actual.settings("site", coordinator=at, site=site, journal=orders.journal, rangers=rangers)
+
+            def listening(actual: "PageAddress") -> None:
+                log.tell("page", "listens", f"browsers connect to {actual.url()}")
+                if self._announce is not None:
+                    self._announce(page_words(actual))
+
+            page = PageChild(
+                self.address,
+                settings,
+                listening=listening,
+                warned=lambda line: log.tell("page", "child", line, "warning"),
+            )
+            await page.child.keep(patient=True)
+
+        return keep
 
 
 def site_page(
-    subject: dict[str, Any],
     *,
     host: str | None,
     port: int | None,
@@ -58,7 +67,6 @@ def site_page(
 ) -> SitePage | None:
     """Page beside a site; None without the packages that it needs, which is announced.
 
-    subject    "site", "journal" and "rangers" by name with their addresses
     port       None for the usual one
     at_once    True to announce the page before it listens: afterwards a screen leaves no place for a line
 
@@ -81,5 +89,4 @@ def site_page(
     at_once = at_once and address.port != 0
     if at_once:
         announce(page_words(address))
-    rangers = {name: (each.host, each.ports[1]) for name, each in subject["rangers"].items()}
-    return SitePage(address, {**subject, "rangers": rangers}, None if at_once else announce)
+    return SitePage(address, None if at_once else announce)

@@ -9,6 +9,7 @@ from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.live.groups import TwinOptions, arguments
 from catseye.cli.live.options import PORT_BASE, PortBase, Site, leave, say_now, tell_people, within
 from catseye.cli.option_groups import grouped
+from catseye.cli.terminal import ProgressLine
 
 
 def _ports(text: str | None) -> str | None:
@@ -75,32 +76,52 @@ def zy(  # noqa: PLR0913 - its options are its command line
     """Serve one ranger, some, or all of a site's, until Ctrl-C: simulated ones, or real ones behind a head."""
     from catseye.api.serving import zy as served
 
-    end = served(
-        site,
-        rangers or (),
-        twin=twin,
-        head=head,
-        **arguments(simulated),
-        clock_offset_s=clock_offset_s,
-        cold=cold,
-        laser_at_boot=laser_at_boot,
-        host=host,
-        port_base=port_base,
-        ports=None if ports is None else _pair(ports),
-        loopback=loopback,
-        files=files,
-        leave_with_stdin=leave_with_stdin,
-        listening=lambda at: _say(at, json, quiet),
-        tell=tell_people,
-    )
+    shown = ProgressLine(quiet, json)
+
+    def listening(at: dict[str, Any]) -> None:
+        shown.clear()
+        _say(at, json, quiet)
+
+    try:
+        end = served(
+            site,
+            rangers or (),
+            twin=twin,
+            head=head,
+            **arguments(simulated),
+            clock_offset_s=clock_offset_s,
+            cold=cold,
+            laser_at_boot=laser_at_boot,
+            host=host,
+            port_base=port_base,
+            ports=None if ports is None else _pair(ports),
+            loopback=loopback,
+            files=files,
+            leave_with_stdin=leave_with_stdin,
+            listening=listening,
+            bound=(lambda at: _say_json({"bound": at})) if leave_with_stdin else (lambda at: None),
+            progress=_tell_parent if leave_with_stdin else shown,
+            tell=tell_people,
+        )
+    finally:
+        shown.clear()
     leave(end.signal, terminated=0)
+
+
+def _say_json(what: dict[str, Any]) -> None:
+    from catseye.api.result import json_text
+
+    say_now(json_text(what))
+
+
+def _tell_parent(what: str, done: int, total: int) -> None:
+    """Progress for the process that has started this one."""
+    _say_json({"ready": done, "of": total})
 
 
 def _say(at: dict[str, Any], json: bool, quiet: bool) -> None:
     if json:
-        from catseye.api.result import json_text
-
-        say_now(json_text(at))
+        _say_json(at)
     elif not quiet:
         for name, (host, first, second) in at["rangers"].items():
             say_now(f"{name:<8} listens at {host} port {first} and port {second}")

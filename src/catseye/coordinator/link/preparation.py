@@ -75,11 +75,11 @@ class Preparation:
             if request.command == "COO" and len(request.parameters) == 5:
                 numbers[request.parameters[4]] = int(request.parameters[0])
         room = [int(r.parameters[0]) for r in commands if r.command == "INI"]
-        wait = {numbers[name] for name in later if name in numbers}
+        wait = {str(numbers[name]) for name in later if name in numbers}
         on_demand: dict[int, tuple[Request, ...]] = {}
         immediate: list[Request] = []
         for request in commands:
-            if request.command in ("COO", "KND") and len(request.parameters) > 1 and int(request.parameters[0]) in wait:
+            if request.command in ("COO", "KND") and len(request.parameters) > 1 and request.parameters[0] in wait:
                 number = int(request.parameters[0])
                 on_demand[number] = (*on_demand.get(number, ()), request)
             else:

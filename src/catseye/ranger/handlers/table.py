@@ -175,22 +175,25 @@ def _commands(path: Path) -> list[tuple[int, Request]]:
         raise InputError(f"{path.name} cannot be read (expected an ASCII file)") from problem
 
 
-def replace_file(folder: Path, name: str, text: str) -> None:
+def replace_file(folder: Path, name: str, text: str, valid: set[str] | None = None) -> None:
     """Replace an initialisation file, if valid; the old one becomes NAME.BAK.
 
     folder   of the ranger's files
     name     one of `file_names`
     text     commands, ASCII, with comments after ;
+    valid    lines known to be valid, to which this file's are added: rangers of a site have most of them in common
 
     Raises InputError: an invalid command, or the file cannot be written.
     """
-    for line, request in commands_of_file(text, name):
+    for line, request in commands_of_file(text, name, valid or ()):
         try:
             if request.command not in COMMANDS:
                 raise InputError(f"unknown command {request.command}")
             COMMANDS[request.command].read(request)
         except InputError as problem:
             raise InputError(f"{name} line {line}: {problem}") from problem
+    if valid is not None:
+        valid.update(text.splitlines())
     path, new = folder / name, folder / f".{name}.new"
     try:
         new.write_text(text, "ascii")

@@ -160,7 +160,7 @@ def visibility(
     stand = np.array(list(rangers.values()), dtype=float).reshape(-1, 3)
     distance = ranges(stand, targets.points)
     angle = incidence(stand, targets.points, targets.axes)
-    limits_of = {kind.name: kind.acceptance.limit for kind in targets.kinds}
+    limits_of = {name: kind.acceptance.limit for name, kind in {kind.name: kind for kind in targets.kinds}.items()}
     limit = np.array([limits_of[kind.name] for kind in targets.kinds])
     which, at, names = _obstructions(stand, targets.points, solids, frames, beam_radius)
     code = np.full(distance.shape, Sight.SEEN, dtype=np.int64)

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.signal import lfilter
 
 MEMORY = 16.0  # time constants before the first time: earlier values count 1e-7
 
@@ -17,6 +16,8 @@ def lagged(history: Callable[[np.ndarray], np.ndarray], seconds, *, time_constan
     Exact for straight pieces: over a step h, y goes to e y + (f - e) x0 + (1 - f) x1, e = exp(-h / T),
     f = (1 - e) T / h. It begins in the steady state of the first step.
     """
+    from scipy.signal import lfilter  # half a second to import
+
     times = np.asarray(seconds, dtype=float)
     if time_constant_s == 0.0:
         return history(times)

@@ -17,7 +17,7 @@ from catseye.ranger.addresses import PORT_BASE, Address, Addresses, ranger_addre
 from catseye.ranger.door import DEFAULT_ACCESS, Door
 from catseye.ranger.handlers.table import file_names, replace_file
 from catseye.ranger.head import RangerHead
-from catseye.ranger.initialisation import RangedPoint, files_of_ranger, places_of
+from catseye.ranger.initialisation import SiteCommands
 from catseye.ranger.network import ConnectionMaker, Sockets
 from catseye.ranger.ranger import Ranger
 from catseye.ranger.server import LOOPBACK, ZyServer
@@ -97,13 +97,13 @@ class TwinSite:
             self._temporary = tempfile.TemporaryDirectory(prefix="catseye-twin-")
             self._folder = Path(self._temporary.name)
         clock = asyncio.get_running_loop().time
-        places = places_of(self.site)
+        commands, valid = SiteCommands(self.site), set[str]()
         try:
             for name, head in self._heads.items():
                 host, *ports = self.addresses[name]
                 gate = Gate()
                 ranger = self._ranger(name, head)
-                self._write_files(ranger, places)
+                self._write_files(ranger, commands, valid)
                 network = FaultyNetwork(self._network, gate)
                 server = ZyServer(ranger, host, (ports[0], ports[1]), door=self._door, clock=clock, network=network)
                 await server.start()
@@ -156,7 +156,7 @@ class TwinSite:
             laser_at_boot=self._door.laser_at_boot,
         )
 
-    def _write_files(self, ranger: Ranger, places: Mapping[str, RangedPoint]) -> None:
+    def _write_files(self, ranger: Ranger, commands: SiteCommands, valid: set[str]) -> None:
         if ranger.files is None:
             return
         try:
@@ -167,9 +167,9 @@ class TwinSite:
             ) from problem
         if all((ranger.files / name).exists() for name in file_names(ranger)):
             return
-        for name, text in files_of_ranger(self.site, ranger.name, places=places).items():
+        for name, text in commands.files(ranger.name).items():
             if not (ranger.files / name).exists():
-                replace_file(ranger.files, name, text)
+                replace_file(ranger.files, name, text, valid)
 
     async def _supervise(self) -> None:
         instant = self.seconds()
