@@ -27,7 +27,7 @@ NUMBERS = re.compile(r"\b(float|int|complex|object|Any|ndarray|NDArray|ArrayLike
 OUR_OWN = {  # functions that people do not call: what goes in is catseye's own numbers, or a command line's
     *(f"catseye.api.journal.{name}" for name in ("run_of", "mjd_argument")),
     *(
-        f"catseye.api.serving.{name}"
+        f"catseye.api.live.serving.{name}"
         for name in ("zy", "coordinator_orders", "mjd_start", "within", "twin_options", "twin_world")
     ),
     "catseye.api.result.json_text",

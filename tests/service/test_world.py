@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import typer
 
-from catseye.api.serving import twin_options, twin_world
+from catseye.api.live.serving import twin_options, twin_world
 from catseye.errors import InputError
 from catseye.service.world import TwinWords
 from simulator.living_scene import site
@@ -24,7 +24,7 @@ def test_options_recreate_the_same_twin_in_another_process(monkeypatch):
         raise InputError("enough")
 
     monkeypatch.setattr("catseye.service.world.TwinWords", noted)
-    monkeypatch.setattr("catseye.api.serving.read_site_of", lambda name: site())
+    monkeypatch.setattr("catseye.api.live.serving.read_site_of", lambda name: site())
     with pytest.raises(InputError, match="enough"):
         typer.main.get_command(app).main(["zy", "gbt", *world.options()])
     assert made == [world]

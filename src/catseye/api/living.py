@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from catseye.aliases import Progress
 from catseye.api.journal import journal_place, run_of
 from catseye.api.live.limits import within
+from catseye.api.live.serving import MOTION, OrderOptions, coordinator_orders, mjd_start, read_site_of, twin_options
 from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
-from catseye.api.serving import MOTION, OrderOptions, coordinator_orders, mjd_start, read_site_of, twin_options
 from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError
 from catseye.memory import uncollected

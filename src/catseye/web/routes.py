@@ -13,7 +13,7 @@ from catseye.web.answers import json_answer
 from catseye.web.subject import PageSubject
 
 if TYPE_CHECKING:
-    from catseye.api.watching import SiteWatch
+    from catseye.api.live.watching import SiteWatch
 
 LATEST_MJD = 1e6
 LARGEST = 2**53  # integers beyond are no numbers of JSON

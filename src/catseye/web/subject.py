@@ -12,7 +12,7 @@ from catseye.web.feed import LiveFeed
 
 if TYPE_CHECKING:
     from catseye.api.live.address import PageSettings
-    from catseye.api.watching import SiteWatch
+    from catseye.api.live.watching import SiteWatch
 
 UNIX_EPOCH, DAY = 40_587.0, 86_400.0  # MJD; s
 
@@ -76,7 +76,7 @@ def subject_of(settings: "PageSettings") -> PageSubject:
         assert settings.path is not None
         report = report_of(settings.path)
         return PageSubject(kind="result", name=str(report["title"]), report=report)
-    from catseye.api.watching import watch_journal, watch_site
+    from catseye.api.live.watching import watch_journal, watch_site
 
     if settings.kind == "journal":
         assert settings.journal is not None

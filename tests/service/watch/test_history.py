@@ -9,8 +9,8 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
+from catseye.api.live.watching import watch_journal
 from catseye.api.surface import surface
-from catseye.api.watching import watch_journal
 from catseye.coordinator.journal import writer
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution, Run
 from catseye.coordinator.journal.reader import JournalReader

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from catseye.api.watching import watch_site
+from catseye.api.live.watching import watch_site
 from coordinator.ziy_scene import gbt
 from process_scene import ends_with_us
 from repository import ROOT

@@ -28,7 +28,7 @@ def serve(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
 ) -> None:
     """Run a site until it is told to end (SIGTERM: status 0): children are started again, everything is logged."""
-    from catseye.api.serving import serve as run
+    from catseye.api.live.serving import serve as run
 
     end = run(
         site,

@@ -10,7 +10,7 @@ from catseye.cli.live.options import Site, leave, say_now, tell_people, within
 from catseye.cli.option_groups import grouped
 
 if TYPE_CHECKING:
-    from catseye.api.serving import SiteEnd
+    from catseye.api.live.serving import SiteEnd
 
 LogJson = Annotated[bool, typer.Option("--log-json", help="The log as one JSON object a line.")]
 Screen = Annotated[bool, typer.Option("--screen", help="A screen for an operator instead of the log; 80 x 24 or more.")]
@@ -39,7 +39,7 @@ def ziy(
     quiet: Quiet = False,
 ) -> None:
     """Run a site's coordinator until Ctrl-C: plan, shoot, reduce, keep a journal, tell whoever asks."""
-    from catseye.api.serving import ziy as run
+    from catseye.api.live.serving import ziy as run
 
     end = run(
         site,

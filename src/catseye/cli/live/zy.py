@@ -74,7 +74,7 @@ def zy(  # noqa: PLR0913 - its options are its command line
     quiet: Quiet = False,
 ) -> None:
     """Serve one ranger, some, or all of a site's, until Ctrl-C: simulated ones, or real ones behind a head."""
-    from catseye.api.serving import zy as served
+    from catseye.api.live.serving import zy as served
 
     shown = ProgressLine(quiet, json)
 

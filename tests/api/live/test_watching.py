@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from catseye.api.watching import watch_journal, watch_site
+from catseye.api.live.watching import watch_journal, watch_site
 from catseye.errors import InputError
 from cli.living_scene import recorded
 

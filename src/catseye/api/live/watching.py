@@ -29,7 +29,7 @@ def watch_site(
 
     Raises InputError for records or an environment that cannot be used.
     """
-    from catseye.api.serving import read_site_of
+    from catseye.api.live.serving import read_site_of
     from catseye.ranger.door import key_of
     from catseye.ranger.network import Sockets, TlsFiles
     from catseye.records.site.folder import SiteFolder
