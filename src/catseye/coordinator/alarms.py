@@ -1,6 +1,6 @@
 """Alarms of a site: since when, acknowledged or shelved, by whom.
 
-Source: [ISA182], states of an alarm: an alarm that returns, or becomes worse, is unacknowledged; shelving ends by itself.
+Source: [ISA182], states of an alarm: one that returns, or becomes worse, is unacknowledged; shelving ends by itself.
 """
 
 import re
