@@ -33,7 +33,7 @@ def site(tmp_path_factory) -> Iterator[LivingSite]:
     twin = Part(
         (
             *("catseye", "zy", "gbt", "--twin", "--start", str(START_MJD), "--clock-offset-s", offset),
-            *("--port-base", "0", "--json", "--leave-with-stdin"),
+            *("--port-base", "0", "--json"),
         ),
         where / "twin.log",
     )
@@ -118,6 +118,7 @@ def watched(chromium):
 
         page.on("console", lambda said: watch.errors.append(said.text) if said.type == "error" else None)
         page.on("pageerror", lambda error: watch.errors.append(str(error)))
+        page.on("response", lambda came: watch.errors.append(came.url) if came.status >= 400 else None)
         page.on("request", lambda request: requested(request.url))
         page.on("websocket", lambda opened_socket: requested(opened_socket.url))
         page.goto(url)

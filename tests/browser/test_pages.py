@@ -8,7 +8,7 @@ from browser.scene import ROOT
 
 LISTED = re.compile(r'name: "(\w+)", title: "[^"]+", .*?kinds: (SITE|\["site")')
 PAGES = [name for name, _ in LISTED.findall((ROOT / "front" / "src" / "pages.ts").read_text())]
-QUERIES = {"ranger": "?name=ZY101", "shot": "?number={shot}", "point": "?name={point}"}
+QUERIES = {"ranger": "?ranger=ZY101", "shot": "?shot={shot}", "point": "?point={point}"}
 
 
 @pytest.fixture(scope="module")

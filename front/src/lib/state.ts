@@ -19,7 +19,7 @@ export interface Problem {
 }
 export interface EpochSummary {
   number: number; mjd: number; points: Num; shots: Num; rejected: Num; variance_factor: Num;
-  degrees_of_freedom: Num; refractivity_ppm: Num; verdict: unknown; verdict_text?: string | null; azimuth: Num; elevation: Num;
+  degrees_of_freedom: Num; refractivity_ppm: Num; verdict: unknown; verdict_text?: string | null; azimuth: Num; elevation: Num; run?: number | null;
 }
 export interface LastShot { number: number; target: string; status: string; range: Num; u_range: Num; misfit: Num }
 export interface RangerState {

@@ -1,4 +1,5 @@
-// The epoch a page shows: the one in the address, else the last before the replay's instant, else the latest.
+// The epoch a page shows: the one in the address, else the last before the replay's instant, else the latest. Numbers
+// begin again with each run of the coordinator: an epoch is of the run in the address, else of the latest.
 import { route } from "../../lib/route.svelte";
 import type { EpochSummary } from "../../lib/state";
 import { resource, type Resource } from "./resource.svelte";
@@ -14,10 +15,14 @@ export class ChosenEpoch {
   constructor(key: string) {
     this.key = key;
     this.list = resource<Epochs>(() => ["/api/epochs", { until: route.at, limit: 60 }], { on: ["epoch"] });
-    this.older = resource<EpochSummary>(() => (this.held && this.list.value && !this.all.some((e) => e.number === this.number) ? [`/api/epochs/${this.number}`] : null));
+    this.older = resource<EpochSummary>(() => (this.held && this.list.value && !this.all.some((e) => e.number === this.number) ? [`/api/epochs/${this.number}`, this.query] : null));
   }
 
-  all = $derived.by(() => [...(this.list.value?.epochs ?? [])].sort((a, b) => a.number - b.number));
+  /** Run of the journal; null without a journal. */
+  run = $derived.by(() => (route.query.run !== undefined ? Number(route.query.run) : (this.list.value?.epochs.at(-1)?.run ?? null)));
+  /** The run, for the requests of this epoch. */
+  query = $derived.by((): { run?: number } => (this.run === null ? {} : { run: this.run }));
+  all = $derived.by(() => (this.list.value?.epochs ?? []).filter((e) => this.run === null || e.run === this.run).sort((a, b) => a.number - b.number));
   latest = $derived.by(() => this.all.at(-1)?.number ?? null);
   /** True where the address names the epoch, so that the page stays with it. */
   held = $derived.by(() => route.query[this.key] !== undefined && Number.isInteger(Number(route.query[this.key])));

@@ -1,1 +1,1 @@
-import{n as e,r as t}from"./route.svelte.js";var n=(n,r={})=>e(n,{at:t.query.at,...r}),r=e=>n(`shot`,{shot:e}),i=e=>n(`point`,{point:e}),a=e=>n(`ranger`,{ranger:e});export{r as i,i as n,a as r,n as t};
+import{n as e,r as t}from"./route.svelte.js";var n=(n,r={})=>e(n,{at:t.query.at,run:t.query.run,...r}),r=e=>n(`shot`,{shot:e}),i=e=>n(`point`,{point:e}),a=e=>n(`ranger`,{ranger:e});export{r as i,i as n,a as r,n as t};
