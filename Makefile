@@ -71,6 +71,7 @@ bench: setup  ## benchmarks, as ratios in one run: main job, phases, positions, 
 	$(BIN)/python benchmarks/bench_air.py
 	$(BIN)/python benchmarks/bench_delay.py
 	$(BIN)/python benchmarks/bench_live.py
+	$(BIN)/python benchmarks/bench_web.py
 	$(BIN)/python benchmarks/bench_start.py
 	$(BIN)/python benchmarks/bench_surface.py
 	$(BIN)/python benchmarks/bench_structure.py

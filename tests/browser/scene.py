@@ -148,7 +148,7 @@ class Watched:
 
     def settle(self) -> None:
         """Wait until nothing says that it is loading."""
-        wait_for(lambda: not re.search("[Ll]oading", self.page.inner_text("main")), 20.0)
+        wait_for(lambda: not re.search("[Ll]oading|on (its|their) way", self.page.inner_text("main")), 20.0)
 
     def picture(self, name: str) -> None:
         """Screenshot for people, where they want one."""

@@ -13,6 +13,7 @@ from repository import ROOT
 from wheel_scene import built, run_there, unpacked
 
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
+SERVING = ("serve", "view")  # until Ctrl-C: tests/cli/live and tests/browser try them
 LONGEST = 60.0  # s that a line may take without having said so beforehand
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
@@ -22,6 +23,7 @@ def pieces():
     found = [
         (match.start(), "catseye", json.dumps(shlex.split(match[1])))
         for match in re.finditer(r"(?m)(?:^    \$ |`)(catseye [a-z][^`\n]*)", TEXT)
+        if match[1].split()[1] not in SERVING
     ]
     found += [(m.start(), "python", m[1]) for m in re.finditer(r"(?ms)^```python\n(.*?)^```", TEXT)]
     return [(kind, text) for _, kind, text in sorted(found)]

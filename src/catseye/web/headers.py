@@ -13,7 +13,7 @@ HEADERS = (
     (b"x-frame-options", b"DENY"),
     (
         b"permissions-policy",
-        b"camera=(), microphone=(), geolocation=(), usb=(), serial=(), bluetooth=(), payment=(), display-capture=()",
+        b"camera=(), microphone=(), geolocation=(), usb=(), serial=(), payment=(), display-capture=()",
     ),
 )
 NO_STORE = (b"cache-control", b"no-store")

@@ -341,7 +341,7 @@ def test_comparison_of_an_epoch_with_itself_moves_nothing(watch):
         watch.comparison(1, 99)
 
 
-def test_surface_refuses_an_epoch_without_covariance(tmp_path):
+def test_surface_of_an_epoch_without_covariance_is_empty_and_says_why(tmp_path):
     path = tmp_path / "no-covariance.db"
     shutil.copy(recorded(), path)
     with sqlite3.connect(path) as connection:
@@ -349,8 +349,9 @@ def test_surface_refuses_an_epoch_without_covariance(tmp_path):
     connection.close()
     watch = watch_journal(path)
     number = watch.epochs()["epochs"][-1]["number"]
-    with pytest.raises(InputError, match="no prisms of the dish with covariance"):
-        watch.surface(number)
+    surface = jsoned(watch.surface(number))
+    assert (surface["points"]["name"], surface["zernike"], surface["rms"]) == ([], [], None)
+    assert (surface["verdict"], surface["verdict_text"]) == ("failed", "no prism of the dish has a covariance")
     assert set(watch.epoch(number)["points"]["covariance"]["xx"]) == {None}
 
 

@@ -150,8 +150,13 @@ def triangles_of(covariance: NDArray[np.float64] | None, count: int) -> NDArray[
 
 
 def plain(text: str) -> str:
-    """Text as a value of a line: printable ASCII without a comma."""
-    return "".join(c if " " <= c <= "~" else "?" for c in text.replace(",", ";"))[:300].strip(" ")
+    """Text as a value of a line: printable ASCII without a comma.
+
+    >>> plain("WX2, +2.5 °C")
+    'WX2; +2.5 degC'
+    """
+    text = text.replace(",", ";").replace("°C", "degC").replace("°", " deg")
+    return "".join(c if " " <= c <= "~" else "?" for c in text)[:300].strip(" ")
 
 
 def _number(value: object) -> str:

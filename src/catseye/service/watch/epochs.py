@@ -272,10 +272,25 @@ def moved_object(names: Sequence[str], moved: NDArray[np.float64], triangles: ND
     }
 
 
+def _no_surface(record: EpochRecord, why: str) -> Object:
+    """Surface of an epoch whose prisms determine none."""
+    return {
+        "epoch": record.number,
+        "points": {key: [] for key in ("name", "x", "y", "deviation", "half_path", "u")},
+        "actuators": None,
+        "aperture": None,
+        "zernike": [],
+        "rms": None,
+        "focal_length": None,
+        "verdict": "failed",
+        "verdict_text": why,
+    }
+
+
 def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     """Shape of the dish from the prisms of one epoch, as `catseye surface` has it.
 
-    Raises InputError where the prisms are too few or determine no shape.
+    Without points where the prisms are too few or determine no shape; the verdict says so.
     """
     from catseye.errors import EstimationError
     from catseye.optics.zernike import number as term_number
@@ -288,7 +303,7 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     rows = [k for k, n in enumerate(names) if n in records.targets and records.targets[n].shapes_dish]
     covariance = record.covariance
     if covariance is None or not rows:
-        raise InputError(f"epoch {record.number} has no prisms of the dish with covariance (expected some)")
+        return _no_surface(record, "no prism of the dish has a covariance")
     at = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
     posture = (record.answer["azimuth"] / DEGREE, record.answer["elevation"] / DEGREE)
     prisms = prisms_of_points(
@@ -302,7 +317,7 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     try:
         result = reduce_surface([prisms], records, ShapeSettings())
     except EstimationError as problem:
-        raise InputError(f"epoch {record.number}: no shape of the dish: {problem}") from problem
+        return _no_surface(record, f"no shape of the dish: {problem}")
     shape = result.shapes[0]
     fit, terms = shape.fit, shape.expansion
     u = np.sqrt(np.maximum(np.diag(fit.deviation_covariance), 0.0))
