@@ -89,6 +89,20 @@ def test_command_asks_once_is_sent_and_the_site_obeys(site, overview):
     overview.assert_clean()
 
 
+def test_dialog_says_from_whom_the_lease_is_taken(site, overview):
+    with socket.create_connection(("127.0.0.1", site.port), 5.0) as other:
+        other.sendall(b"1\tLEASE bert\n")
+        wait_for(lambda: "bert" in (site.get("state")["lease"] or ""))
+        overview.page.click("button:has-text('Mode')")
+        dialog = overview.page.locator("dialog[open]")
+        dialog.get_by_text(re.compile("bert.* commands now")).wait_for(timeout=10_000)
+        dialog.locator("select").select_option("active")
+        dialog.get_by_label("Your name").fill("anna")
+        dialog.get_by_role("button", name="Send MODE").click()
+        dialog.get_by_text("the lease was taken from bert").wait_for(timeout=10_000)
+    overview.assert_clean()
+
+
 def test_alarm_is_acknowledged_with_who_and_when(site, overview):
     page = overview.page
     page.click("button:has-text('Drop')")

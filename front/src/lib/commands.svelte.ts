@@ -79,8 +79,8 @@ class Commands {
     const parameters = kind.parameters(values);
     const who = settings.who;
     return this.run([kind.name, ...parameters].join(" "), who, async () => {
-      const answer = await post<{ values: unknown }>("/api/commands", { command: kind.name, parameters, who });
-      return said(answer.values);
+      const answer = await post<{ values: unknown; lease_from?: string | null }>("/api/commands", { command: kind.name, parameters, who });
+      return said(answer.values) + (answer.lease_from ? `; the lease was taken from ${answer.lease_from}` : "");
     });
   }
 
