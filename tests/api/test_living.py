@@ -7,7 +7,7 @@ from datetime import date
 import pytest
 
 import catseye
-from catseye.api import serving
+from catseye.api.live import serving
 from catseye.cli.commands import app, join_commands
 from catseye.errors import ArgumentError, InputError
 from repository import ROOT
