@@ -41,6 +41,7 @@ tests: setup
 
 test-web: setup  ## pages in a browser, and the front end built again: wants Node 20.19 and Chromium, says what it lacks
 	$(BIN)/python tests/browser/prerequisites.py || exit 0; \
+	$(MAKE) --no-print-directory front/node_modules || { echo "tests of the pages SKIPPED: npm ci failed (registry?)"; exit 0; }; \
 	$(MAKE) --no-print-directory front-check && \
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test-web]' && \
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m browser tests/browser
