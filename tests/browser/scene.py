@@ -116,7 +116,7 @@ def free_port() -> int:
 
 
 def wait_for(done, seconds: float = LONGEST_START):
-    """What `done` returns once it is true."""
+    """Value of `done` once it is true."""
     until = time.monotonic() + seconds
     while not (value := done()):
         assert time.monotonic() < until, f"nothing after {seconds:g} s"

@@ -40,7 +40,7 @@ def test_rounds_are_measured_reduced_journalled_and_acknowledged():
 
 
 def test_ranges_of_an_epoch_stand_behind_its_solution():
-    """As a document of their own; an unknown number is null, and the answer has none of it."""
+    """Stored as a document of their own; an unknown number is null, and the answer has none of it."""
     from catseye.coordinator.journal.entries import Document, ranges_document
     from coordinator.ziy_scene import Answer
 

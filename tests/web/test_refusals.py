@@ -1,4 +1,4 @@
-"""What is refused: wrong tokens, hosts and origins, bodies, paths and manners. It is logged and changes nothing."""
+"""Refusals: wrong tokens, hosts and origins, bodies, paths and manners. Each is logged and changes nothing."""
 
 import contextlib
 import http.client

@@ -11,7 +11,8 @@ from catseye.gateways.calibrations.field_certificate import report_subject
 from catseye.gateways.certificates.document import NOT_STATED, CellTable, Facts, Paragraph
 from catseye.gateways.certificates.page import certificate_html
 from catseye.gateways.certificates.statement import certificate_document
-from catseye.records.laboratory.certificate_job import CertificateRecords
+from catseye.records.laboratory.certificate_job import CertificateRecords, Specification
+from catseye.reduction.calibrations.conformity import conformities
 from repository import ROOT
 
 
@@ -149,3 +150,22 @@ def test_a_page_prints_with_numbers_and_without_a_column_cut_off(document):
     assert 'content: "page " counter(page) " of " counter(pages)' in text
     assert "td.w { min-width: 0; }" in text
     assert "thead { display: table-header-group; }" in text
+
+
+@pytest.mark.parametrize(
+    ("limits", "word", "why"),
+    [
+        ((-9.0, 9.0), "good", ""),
+        ((0.02, 9.0), "doubtful", "zero_mm conditional"),
+        ((1.0, 9.0), "failed", "zero_mm fail"),
+    ],
+)
+def test_first_page_is_no_better_than_the_statements_of_conformity(certified, when, limits, word, why):
+    """Its own tests pass; the item lies within, near or outside its limits."""
+    zero = Specification(key="zero_mm", lower=limits[0], upper=limits[1])
+    job = certified.issue.records.job.model_copy(update={"specification": (zero,)})
+    judged = conformities(certified.calibration.quantities, job)
+    subject = calibration_subject(certified.calibration)
+    verdict = certificate_document(subject, certified.issue.records, judged, when).verdict
+    assert (subject.verdict.word, verdict.word) == ("good", word)
+    assert why in verdict.why

@@ -24,7 +24,7 @@ def test_newest_picture_is_shown_and_the_usual_screen_comes_back():
 
 
 def test_a_terminal_that_takes_nothing_holds_up_nobody():
-    """As after Ctrl-S: the kernel's buffer fills, and a write would wait for ever."""
+    """Terminal after Ctrl-S: the kernel's buffer fills, and a write would wait for ever."""
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
     with open(theirs, "w", encoding="utf-8", closefd=False) as file:

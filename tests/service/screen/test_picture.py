@@ -26,7 +26,7 @@ def picture_of(site, width, height, colours=None):
 
 
 def pictured(site, width, height, chosen=None):
-    """What stands on the screen, line by line."""
+    """Text of the screen, line by line."""
     return picture_of(site, width, height).lines(chosen or Chosen())
 
 

@@ -135,7 +135,7 @@ def test_residuals_are_the_adjustments(watch, entries):
 
 
 def test_journal_without_stored_ranges_gives_residuals_by_prediction(tmp_path):
-    """As an earlier version wrote them: each shot's range less its prediction."""
+    """Residuals of an earlier version: each shot's range less its prediction."""
     path = tmp_path / "old.db"
     shutil.copy(recorded(), path)
     with sqlite3.connect(path) as connection:

@@ -118,7 +118,7 @@ def test_coordinator_that_ends_is_noticed_and_found_again():
 
 
 def test_frozen_coordinator_is_lost_within_two_polls_and_comes_back():
-    """As by SIGSTOP: the connection stands, nothing answers."""
+    """Silence of a stopped process: the connection stands, nothing answers."""
 
     async def story():
         async with Watched() as site:

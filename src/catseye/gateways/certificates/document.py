@@ -85,7 +85,7 @@ class CertificateDocument:
     subject      one line: what was calibrated
     letterhead   of the laboratory
     issued_on    date of issue
-    verdict      of the calibration's own tests
+    verdict      of the calibration's own tests, and no better than its statements of conformity
     facts        identity of item, customer and work
     results      chapter of the first page, above the signatures
     signatures   (role, name) in order; an empty name is a line to fill in

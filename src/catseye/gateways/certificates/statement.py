@@ -97,6 +97,19 @@ class CertifiedSubject:
     settings: Mapping[str, object]
 
 
+def _verdict(tests: Verdict, conformities: Sequence[Conformity]) -> Verdict:
+    """Verdict of the first page: no better than the statements of conformity.
+
+    tests   verdict of the calibration's own tests
+    """
+    judged = {each.quantity.key: each.statement for each in conformities if each.statement != "pass"}
+    if not judged:
+        return tests
+    why = f"{tests.why}; conformity: {', '.join(f'{key} {statement}' for key, statement in judged.items())}"
+    fails = tests.word == "failed" or not {"fail", "conditional fail"}.isdisjoint(judged.values())
+    return Verdict("failed" if fails else "doubtful", why)
+
+
 def certificate_document(
     subject: CertifiedSubject, records: CertificateRecords, conformities: Sequence[Conformity], when: datetime
 ) -> CertificateDocument:
@@ -113,7 +126,7 @@ def certificate_document(
         subject=subject.title,
         letterhead=_letterhead(records),
         issued_on=issued_on,
-        verdict=subject.verdict,
+        verdict=_verdict(subject.verdict, conformities),
         facts=Facts(tuple(_facts(subject, records, issued_on))),
         results=_results(subject, conformities),
         signatures=_signatures(records.laboratory),

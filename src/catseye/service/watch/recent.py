@@ -63,7 +63,7 @@ class Words:
 
 
 class RecentPast:
-    """What came in the last hour."""
+    """Events of the last hour, in bounded memory."""
 
     def __init__(self) -> None:
         self._shots, self._postures = Ring(MOST_SHOTS, SHOT_ROW), Ring(MOST_POSTURES, POSTURE_ROW)
