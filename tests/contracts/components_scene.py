@@ -15,7 +15,8 @@ PAGE = ROOT / "docs" / "components.md"
 LOCK = ROOT / "front" / "package-lock.json"
 BUILT_IN = ("clsx", "esm-env", "svelte", "uplot")  # what Vite puts into the files; svelte brings the first two
 FOR_DEVELOPERS = ("dev", "test-web")  # extras
-REQUIREMENT = re.compile(r"^([A-Za-z0-9._-]+)(?:\[[^\]]*\])?[^;]*(?:;(.*))?$")
+REQUIREMENT = re.compile(r"^([A-Za-z0-9._-]+)(?:\[([^\]]*)\])?[^;]*(?:;(.*))?$")  # name, its extras, marker
+EXTRA = re.compile(r"extra == ['\"]([^'\"]+)['\"]")
 LONGEST = 40  # characters of a licence; some packages state its whole text
 CLASSIFIER = "License :: OSI Approved :: "
 SPELLED = {  # of packages that state no expression
@@ -54,17 +55,18 @@ def project():
 
 def closure(names, pinned):
     """Those packages and all that they need here."""
-    found, waiting = set(), list(names)
+    found, waiting = set(), [(name, "") for name in names]
     while waiting:
-        name = waiting.pop()
-        if name in found or name not in pinned:
+        name, extras = waiting.pop()
+        if (name, extras) in found or name not in pinned:
             continue
-        found.add(name)
+        found.add((name, extras))
         for text in requires(name) or ():
-            requirement, marker = REQUIREMENT.match(text).groups()
-            if "extra ==" not in (marker or "") or normal(requirement) in (f"{name}-binary", f"{name}-core"):
-                waiting.append(normal(requirement))
-    return found
+            requirement, wanted, marker = REQUIREMENT.match(text).groups()
+            own = normal(requirement) in (f"{name}-binary", f"{name}-core")
+            if own or set(EXTRA.findall(marker or "")) <= set(extras.split(",")):
+                waiting.append((normal(requirement), wanted or ""))
+    return {name for name, _ in found}
 
 
 def licence(name):
