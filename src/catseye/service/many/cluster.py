@@ -21,6 +21,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from catseye.errors import ArgumentError, InputError
+from catseye.memory import keep_heap_small
 from catseye.processors import VARIABLES
 from catseye.service.many.unit import Death, LostClusterError, Unit, UnitReport
 from catseye.service.many.work import perform
@@ -62,6 +63,7 @@ def perform_remotely(unit: Unit, ledger: Path | None, version: str) -> UnitRepor
     with _ONE_AT_A_TIME:
         os.environ.update(dict.fromkeys(VARIABLES, "1"))
         threadpool_limits(limits=1, user_api="blas")
+        keep_heap_small()
         return perform(unit, ledger)
 
 
