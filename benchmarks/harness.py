@@ -1,9 +1,9 @@
 """Rows of the benchmarks' table: catseye beside its alternatives and the machine's limit, timed in interleaved rounds.
 
-A script `bench_*.py` has `rows(quick)`, a generator of `Row`, and ends in `main(rows)`; `run.py` runs every script, each in a
-process of its own, and makes of all rows one table. A row measures the same work in quick mode and in the whole run, as
-`bench-guard` compares the ratios of both: quick means fewer rounds and no slow alternatives. Work of another size has
-another `what`.
+A script `bench_*.py` has `rows(quick)`, a generator of `Row`, and ends in `main(rows)`; `run.py` runs every script, each
+in a process of its own, and makes of all rows one table. A row measures the same work in quick mode and in the whole
+run, as `bench-guard` compares the ratios of both: quick means fewer rounds and no slow alternatives. Work of another
+size has another `what`.
 """
 
 import argparse
@@ -142,7 +142,7 @@ def raced(
     note: str = "",
     skipped: Mapping[str, str] | None = None,
 ) -> Row:
-    """The row of a race: the first contender is ours, one named `limit` the machine's limit, the others stand beside."""
+    """Row of a race: the first contender is ours, one named `limit` is the machine's limit, the others are beside."""
     seconds = race(contenders, quick=quick)
     median = {name: float(np.nanmedian(values)) for name, values in seconds.items()}
     ours, *others = contenders
