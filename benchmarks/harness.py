@@ -1,9 +1,9 @@
-"""Rows of the benchmarks' table: catseye beside its alternatives and the machine's limit, timed in interleaved rounds.
+"""Rows of the benchmarks' table: catseye beside alternatives and the machine's limit, timed in interleaved rounds.
 
-A script `bench_*.py` has `rows(quick)`, a generator of `Row`, and ends in `main(rows)`; `run.py` runs every script, each
-in a process of its own, and makes of all rows one table. A row measures the same work in quick mode and in the whole
-run, as `bench-guard` compares the ratios of both: quick means fewer rounds and no slow alternatives. Work of another
-size has another `what`.
+A script `bench_*.py` has `rows(quick)`, a generator of `Row`, and ends in `main(rows)`; `run.py` runs every
+script, each in a process of its own, and makes of all rows one table. A row measures the same work in quick mode and in
+the whole run, as `bench-guard` compares the ratios of both: quick means fewer rounds and no slow alternatives. Work of
+another size has another `what`.
 """
 
 import argparse
@@ -147,13 +147,14 @@ def raced(
     median = {name: float(np.nanmedian(values)) for name, values in seconds.items()}
     ours, *others = contenders
     beside = {name: median[name] for name in others if name != LIMIT}
+    often = max(others, key=lambda name: int(np.isfinite(seconds[name]).sum()), default=None)  # ran in most rounds
     return Row(
         path=path,
         what=what,
         ours_s=median[ours],
         beside=beside,
         limit_s=median.get(LIMIT),
-        spread=spread(seconds[ours], seconds[others[0]] if others else None),
+        spread=spread(seconds[ours], None if often is None else seconds[often]),
         note=note,
         skipped=dict(skipped or {}),
     )

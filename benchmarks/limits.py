@@ -68,7 +68,7 @@ def median_seconds(work: Callable[[], object], rounds: int = ROUNDS) -> float:
 
 
 def measured() -> dict[str, float]:
-    """Limits in SI units: bytes/s read by one thread and by two, written by one, operations/s, s of a flush of 16 KiB."""
+    """Limits: bytes/s read by one thread and by two, and written by one; operations/s; s of a flush of 16 KiB."""
     words = np.zeros(READ_BYTES // 8, dtype=np.int64)
     halves = np.split(words, 2)
 
