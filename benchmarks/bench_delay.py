@@ -8,6 +8,7 @@ correlates the whole second, or the window about the predicted arrival, and a pa
 limit reads the samples that the pulse and its window need.
 """
 
+import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -87,6 +88,7 @@ def rows(quick: bool) -> Iterator[Row]:
         {name: Contender(lambda form=form: form(heard[0])) for name, form in forms.items()}  # type: ignore[misc]
         | {LIMIT: Contender(lambda: limits.read(words))},
         quick=quick,
+        clock=time.process_time,
         note=note,
     )
     yield raced(
@@ -101,6 +103,7 @@ def rows(quick: bool) -> Iterator[Row]:
             for count in [MANY if name.startswith("catseye") else FEW]
         },
         quick=quick,
+        clock=time.process_time,
     )
 
 

@@ -214,6 +214,7 @@ def compare(size: tuple[int, int], folder: Path, *, quick: bool) -> Iterator[Row
             what,
             {"catseye": ours(net, tests=tests), **plain, **(fast if tests else timed), **bound},
             quick=quick,
+            clock=time.process_time,
             note=note,
             skipped=skipped,
         )
@@ -247,6 +248,7 @@ def variants(size: tuple[int, int], *, quick: bool) -> Row:
         f"{size[0]} stations, {size[1]} targets, all statistics",
         {"catseye": ours(net, tests=True), **{f"ours, {name}": ours(one, tests=True) for name, one in kinds.items()}},
         quick=quick,
+        clock=time.process_time,
         note="our own variants, smaller is better",
     )
 

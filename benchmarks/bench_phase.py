@@ -5,6 +5,7 @@ python benchmarks/bench_phase.py [--quick]
 The limit is one compiled read of the same memory. The others work on a part of it and count by the byte.
 """
 
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -93,6 +94,7 @@ def rows(quick: bool) -> Iterator[Row]:
                 },
             },
             quick=quick,
+            clock=time.process_time,
             note=f"phasors agree to {apart:.0e} V, the lock-in's to {np.abs(lock_in(few, n) - answer).max():.0e} V",
         )
         yield raced(
@@ -104,6 +106,7 @@ def rows(quick: bool) -> Iterator[Row]:
                 LIMIT: reading,
             },
             quick=quick,
+            clock=time.process_time,
         )
         turns = few[: len(few) // 4 * 4].reshape(-1, 4, CYCLES * n).transpose(0, 2, 1).reshape(-1, 4).copy()
         woven = codes[: len(codes) // 4 * 4].reshape(-1, CYCLES * n, 4)  # the same memory read as four channels
@@ -119,6 +122,7 @@ def rows(quick: bool) -> Iterator[Row]:
                 LIMIT: reading,
             },
             quick=quick,
+            clock=time.process_time,
         )
 
 

@@ -61,26 +61,31 @@ class Row:
 
 @dataclass(frozen=True)
 class Curve:
-    """Seconds against size of one hot path.
+    """Time or memory against size of one hot path.
 
     variable   what grows, as the axis is labelled
     sizes      (n,)
-    seconds    (n,), medians
+    values     (n,), medians, in `unit`
     """
 
     path: str
     what: str
     variable: str
     sizes: tuple[float, ...]
-    seconds: tuple[float, ...]
+    values: tuple[float, ...]
+    unit: str = "s"
+
+    def text(self, value: float) -> str:
+        """Value with its unit."""
+        return duration(value) if self.unit == "s" else f"{value:.3g} {self.unit}"
 
     def exponent(self) -> tuple[float, float]:
-        """Slope of log seconds against log size, and its standard uncertainty from the residuals.
+        """Slope of log value against log size, and its standard uncertainty from the residuals.
 
         >>> Curve("a", "b", "n", (1.0, 10.0, 100.0), (2.0, 200.0, 20000.0)).exponent()
         (2.0, 0.0)
         """
-        x, y = np.log(self.sizes), np.log(self.seconds)
+        x, y = np.log(self.sizes), np.log(self.values)
         dx = x - x.mean()
         slope = float(dx @ y / (dx @ dx))
         off = y - y.mean() - slope * dx
@@ -100,8 +105,13 @@ class Contender:
     timed: bool = False
 
 
-def race(contenders: Mapping[str, Contender], *, quick: bool) -> dict[str, np.ndarray]:
+def race(
+    contenders: Mapping[str, Contender], *, quick: bool, clock: Callable[[], float] = time.perf_counter
+) -> dict[str, np.ndarray]:
     """Seconds of each contender for the row's work, a round each, NaN where a slow one did not run.
+
+    clock   `time.perf_counter`; `time.process_time` where all contenders compute on one thread of this process: the
+            same on an idle machine, and steadier beside other programs
 
     BLAS takes one thread. The first call of each is not counted: it compiles, loads and touches memory.
     """
@@ -110,7 +120,7 @@ def race(contenders: Mapping[str, Contender], *, quick: bool) -> dict[str, np.nd
     with threadpool_limits(limits=1):
         for name, contender in contenders.items():
             contender.work()
-            alone = _seconds(contender, 1)
+            alone = _seconds(contender, 1, clock)
             calls[name] = 1 if contender.timed else max(1, min(1000, math.ceil(SHORTEST / max(alone, 1e-9))))
             most[name] = min(rounds, QUICK_ROUNDS) if alone > SLOW else rounds
             taken[name] = np.full(rounds, np.nan)
@@ -119,18 +129,18 @@ def race(contenders: Mapping[str, Contender], *, quick: bool) -> dict[str, np.nd
         for turn in range(rounds):
             for name, contender in contenders.items():
                 if turn < most[name]:
-                    taken[name][turn] = _seconds(contender, calls[name])
+                    taken[name][turn] = _seconds(contender, calls[name], clock)
     return {name: seconds / contenders[name].share for name, seconds in taken.items()}
 
 
-def _seconds(contender: Contender, calls: int) -> float:
+def _seconds(contender: Contender, calls: int, clock: Callable[[], float]) -> float:
     """Seconds of one call, mean of so many in a loop."""
     if contender.timed:
         return float(contender.work())
-    begun = time.perf_counter()
+    begun = clock()
     for _ in range(calls):
         contender.work()
-    return (time.perf_counter() - begun) / calls
+    return (clock() - begun) / calls
 
 
 def raced(
@@ -139,11 +149,12 @@ def raced(
     contenders: Mapping[str, Contender],
     *,
     quick: bool,
+    clock: Callable[[], float] = time.perf_counter,
     note: str = "",
     skipped: Mapping[str, str] | None = None,
 ) -> Row:
     """Row of a race: the first contender is ours, one named `limit` is the machine's limit, the others are beside."""
-    seconds = race(contenders, quick=quick)
+    seconds = race(contenders, quick=quick, clock=clock)
     median = {name: float(np.nanmedian(values)) for name, values in seconds.items()}
     ours, *others = contenders
     beside = {name: median[name] for name in others if name != LIMIT}
@@ -175,12 +186,22 @@ def missing(*modules: str) -> dict[str, str]:
     return {name: "not installed" for name in modules if importlib.util.find_spec(name) is None}
 
 
-def main(rows: Callable[[bool], Iterator[Row]], curves: Callable[[bool], Iterator[Curve]] | None = None) -> None:
-    """Command line of one script: its rows as text, or as JSON lines in a file for `run.py`."""
+def main(
+    rows: Callable[[bool], Iterator[Row]],
+    curves: Callable[[bool], Iterator[Curve]] | None = None,
+    *,
+    flags: Mapping[str, str] | None = None,
+) -> None:
+    """Command line of one script: its rows as text, and as JSON lines in a file for `run.py`.
+
+    flags   further options without a value, which the script reads itself, and their help
+    """
     parser = argparse.ArgumentParser(description=(sys.modules["__main__"].__doc__ or "").partition("\n")[0])
     parser.add_argument("--quick", action="store_true", help="fewer rounds, no slow alternatives")
     parser.add_argument("--curves", action="store_true", help="scaling curves too")
     parser.add_argument("--lines", type=Path, metavar="FILE", help="results as JSON lines, too")
+    for flag, text in (flags or {}).items():
+        parser.add_argument(flag, action="store_true", help=text)
     options = parser.parse_args()
     produced = [("row", rows)] + ([("curve", curves)] if curves and options.curves else [])
     for kind, generator in produced:
@@ -208,7 +229,7 @@ def in_words(result: Row | Curve) -> str:
     """Lines of text for a terminal."""
     if isinstance(result, Curve):
         slope, u = result.exponent()
-        pairs = ", ".join(f"{n:g}: {duration(t)}" for n, t in zip(result.sizes, result.seconds, strict=True))
+        pairs = ", ".join(f"{n:g}: {result.text(v)}" for n, v in zip(result.sizes, result.values, strict=True))
         return f"{result.path}, {result.what}: {result.variable}^{slope:.2f} (u {u:.2f}); {pairs}"
     lines = [f"{result.path}: {result.what}: {duration(result.ours_s)}, spread {100 * result.spread:.0f} %"]
     for name, ratio in result.ratios().items():
