@@ -82,8 +82,9 @@ def judge(now: Ratios, baseline: Ratios, again: Callable[[set[str]], Ratios]) ->
     return Judgement(tuple(fallen), sum(known), len(known) - sum(known))
 
 
-def read_baseline(path: Path = BASELINE) -> dict[str, dict[str, float]]:
-    """Ratios of a baseline; raises SystemExit with one line where there is none of this format."""
+def read_baseline(path: Path | None = None) -> dict[str, dict[str, float]]:
+    """Ratios of a baseline, None the committed one; raises SystemExit with one line for another file."""
+    path = path or BASELINE
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
