@@ -10,11 +10,11 @@ from catseye.estimation.network import batched
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fixed_parts
 from catseye.estimation.network.batched import BatchedNetwork
 from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
-from catseye.estimation.network.monte_carlo import Simulation
+from catseye.estimation.network.monte_carlo import NetworkSimulation
 from catseye.estimation.network.plan import predicted
 from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.records.network.any_file import read_network
-from kinds_scene import OTHERS, POINTS, P, groups
+from estimation.kinds_scene import OTHERS, POINTS, P, groups
 from laws.network_scene import DATUMS, DIMENSIONS, scene
 from repository import ROOT
 
@@ -26,7 +26,7 @@ def compare(network, *, runs=RUNS, seed=3):
     """Solve drawn sets both ways; the solution and the batch."""
     solution = adjust_network(predicted(network))
     assert BatchedNetwork.suits(solution)
-    drawn = Simulation.of(solution, seed=seed).draw(0, runs)
+    drawn = NetworkSimulation.of(solution, seed=seed).draw(0, runs)
     moving = np.flatnonzero(fixed_parts(solution).free)
     batch = BatchedNetwork(fixed_parts(solution)).solve(drawn.observed)
     assert batch.accepted.all()
@@ -157,7 +157,7 @@ def test_a_value_that_is_no_number_refuses_its_own_set_only(ranging_network):
 @pytest.mark.parametrize("numbers", [1, 30_000, 10**9])
 def test_the_size_of_a_batch_changes_nothing(ranging_network, monkeypatch, numbers):
     solution = adjust_network(predicted(ranging_network(7)[0]))
-    drawn = Simulation.of(solution, seed=1).draw(0, 40)
+    drawn = NetworkSimulation.of(solution, seed=1).draw(0, 40)
     usual = BatchedNetwork(fixed_parts(solution)).solve(drawn.observed)
     monkeypatch.setattr(batched, "BATCH_NUMBERS", numbers)
     other = BatchedNetwork(fixed_parts(solution)).solve(drawn.observed)

@@ -7,7 +7,7 @@ import pytest
 
 from catseye.estimation.network.copies import prediction
 from catseye.estimation.observations.kinds import FixedDistances, ObservedCoordinates
-from kinds_scene import N, groups
+from estimation.kinds_scene import N, groups
 
 NAMES = [type(group).__name__ for group in groups(0)[0]]
 ONE_BY_ONE = {"RigidBodies", "PointsOnLine"}  # of one pose or line for all their rows

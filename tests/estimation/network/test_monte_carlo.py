@@ -13,8 +13,8 @@ from catseye.estimation.network.model import NetworkParameter, NetworkPoints, Ob
 from catseye.estimation.network.monte_carlo import (
     BLOCK,
     Disturbance,
+    NetworkSimulation,
     RunSums,
-    Simulation,
     chunks,
     scatter_of,
     seconds_per_run,
@@ -30,12 +30,12 @@ def solved(network):
 
 
 def scatter(solution, runs, seed, **disturbance):
-    made = Simulation.of(solution, seed=seed, disturbance=Disturbance(**disturbance))
+    made = NetworkSimulation.of(solution, seed=seed, disturbance=Disturbance(**disturbance))
     return scatter_of(made, made.run(0, runs, adjust_network))
 
 
 def simulation(network, seed=1, **disturbance):
-    return Simulation.of(solved(network), seed=seed, disturbance=Disturbance(**disturbance))
+    return NetworkSimulation.of(solved(network), seed=seed, disturbance=Disturbance(**disturbance))
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_every_tenth_too_small_a_variance_is_noticed_by_the_matrix_alone(ranging
     claimed = solved(network)
     of_one = network.groups[0].origin == 0
     worse = replace(network.groups[0], covariance=network.groups[0].covariance * np.where(of_one, 1.3**2, 1.0))
-    plain = Simulation.of(claimed, seed=4)
+    plain = NetworkSimulation.of(claimed, seed=4)
     worse_draws = replace(
         plain, network=replace(plain.network, groups=(replace(worse, observed=plain.network.groups[0].observed),))
     )
@@ -82,7 +82,7 @@ def test_every_tenth_too_small_a_variance_is_noticed_by_the_matrix_alone(ranging
 
 @pytest.mark.parametrize("disturbance", [{}, {"common_ppm": 2.0, "station_ppm": 1.0}])
 def test_batches_and_single_runs_have_the_same_sums(feed_arm, disturbance):
-    made = Simulation.of(feed_arm, seed=5, disturbance=Disturbance(**disturbance))
+    made = NetworkSimulation.of(feed_arm, seed=5, disturbance=Disturbance(**disturbance))
     assert made.in_batches
     together = made.run(0, 30, adjust_network)
     alone = replace(made, in_batches=False).run(0, 30, adjust_network)
@@ -94,7 +94,7 @@ def test_batches_and_single_runs_have_the_same_sums(feed_arm, disturbance):
 
 
 def test_runs_are_the_same_however_they_are_divided(feed_arm):
-    made = Simulation.of(feed_arm, seed=6)
+    made = NetworkSimulation.of(feed_arm, seed=6)
     every = made.draw(0, 3 * BLOCK)
     for first, count in ((0, 7), (BLOCK, BLOCK), (BLOCK, BLOCK + 3), (2 * BLOCK, 1)):
         part = made.draw(first, count)
@@ -105,12 +105,12 @@ def test_runs_are_the_same_however_they_are_divided(feed_arm):
     sums = [made.run(first, count, adjust_network) for first, count in ((0, BLOCK), (BLOCK, 2 * BLOCK))]
     once = made.run(0, 3 * BLOCK, adjust_network)
     np.testing.assert_allclose((sums[0] + sums[1]).moments, once.moments, rtol=1e-9, atol=1e-9)
-    other = Simulation.of(feed_arm, seed=7).draw(0, 1)
+    other = NetworkSimulation.of(feed_arm, seed=7).draw(0, 1)
     assert not np.any(other.observed[1] == every.observed[1][:1])
 
 
 def test_sums_survive_json_to_the_last_bit(feed_arm):
-    made = Simulation.of(feed_arm, seed=8)
+    made = NetworkSimulation.of(feed_arm, seed=8)
     sums = made.run(0, 40, adjust_network)
     back = RunSums.from_object(json.loads(json.dumps(sums.to_object())))
     for name, value in vars(sums).items():
@@ -120,7 +120,7 @@ def test_sums_survive_json_to_the_last_bit(feed_arm):
 @pytest.mark.parametrize("runs", [1, BLOCK, BLOCK + 1, 10_000, 123_456])
 def test_chunks_are_all_runs_once_and_begin_blocks(feed_arm, runs):
     for blunders in (0.0, 0.02):
-        made = Simulation.of(feed_arm, seed=1, disturbance=Disturbance(blunders=blunders))
+        made = NetworkSimulation.of(feed_arm, seed=1, disturbance=Disturbance(blunders=blunders))
         parts = chunks(made, runs)
         assert parts[0][0] == 0
         assert sum(count for _, count in parts) == runs

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from catseye.errors import EstimationError
 from catseye.estimation.observations import kinds
 from draws import examples
-from kinds_scene import N, P, groups
+from estimation.kinds_scene import N, P, groups
 
 seeds = st.integers(0, 2**32 - 1)
 

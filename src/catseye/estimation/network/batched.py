@@ -228,7 +228,7 @@ class BatchedNetwork:
         return roots, held
 
     def _variances(self, roots: np.ndarray) -> np.ndarray:
-        """Variances (r, k) in the datum."""
+        """Variances (r, k) of the parameters in the datum."""
         variance = np.einsum("rij,rij->rj", roots, roots)
         if len(self._conditions):
             b = np.matmul(roots.transpose(0, 2, 1), np.matmul(roots, self._conditions.T))
@@ -247,7 +247,7 @@ def _weight(covariance: np.ndarray) -> np.ndarray:
 
 
 def _weighted(weight: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """P v (r, m)."""
+    """Weighted residuals P v (r, m)."""
     if weight.ndim == 1:
         return residual * weight
     if weight.ndim == 2:

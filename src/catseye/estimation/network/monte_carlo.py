@@ -144,7 +144,7 @@ class RunSums:
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation:
+class NetworkSimulation:
     """Network to be measured and adjusted many times.
 
     network       with its datum marked; its coordinates and parameters are the truth of every run
@@ -164,7 +164,7 @@ class Simulation:
     in_batches: bool
 
     @classmethod
-    def of(cls, solution: NetworkSolution, *, seed: int, disturbance: Disturbance = UNDISTURBED) -> "Simulation":
+    def of(cls, solution: NetworkSolution, *, seed: int, disturbance: Disturbance = UNDISTURBED) -> "NetworkSimulation":
         """Simulation of a network that was solved with its predicted observations."""
         parts = fixed_parts(solution)
         moving = np.flatnonzero(parts.free)
@@ -175,7 +175,14 @@ class Simulation:
         combinations = np.zeros((len(root), len(moving)))
         combinations[:, tested] = root
         alone = disturbance.blunders > 0.0 or not BatchedNetwork.suits(solution)
-        return cls(solution.network, parts, combinations, disturbance, seed, not alone)
+        return cls(
+            network=solution.network,
+            parts=parts,
+            combinations=combinations,
+            disturbance=disturbance,
+            seed=seed,
+            in_batches=not alone,
+        )
 
     @cached_property
     def moving(self) -> np.ndarray:
@@ -248,7 +255,7 @@ class Simulation:
         return sums
 
     def _solved(self, runs: DrawnRuns, solve: Solve) -> RunSums:
-        """Sums over drawn runs."""
+        """Sums over drawn runs, solved here."""
         count, status = len(runs.truth), ""
         x, claims = np.full((2, count, len(self.moving)), np.nan)
         usable, tally = np.zeros(count, dtype=bool), np.zeros(4, dtype=int)
@@ -321,7 +328,7 @@ def _rejections(solution: NetworkSolution, wrong: Sequence[np.ndarray]) -> np.nd
     return total
 
 
-def chunks(simulation: Simulation, runs: int) -> list[tuple[int, int]]:
+def chunks(simulation: NetworkSimulation, runs: int) -> list[tuple[int, int]]:
     """First run and number of runs of each chunk, of `CHUNK_S` at least where there are enough.
 
     They depend on the network and on the number of runs, never on the machine or the processes.
@@ -336,7 +343,7 @@ def chunks(simulation: Simulation, runs: int) -> list[tuple[int, int]]:
     return [(low, high - low) for low, high in pairwise(edges)]
 
 
-def seconds_per_run(simulation: Simulation) -> float:
+def seconds_per_run(simulation: NetworkSimulation) -> float:
     """Processor time of a run, s, within a factor of three, of a core of 2020.
 
     Fitted to 20 to 600 parameters; see `benchmarks/bench_plan.py`.
@@ -349,7 +356,7 @@ def seconds_per_run(simulation: Simulation) -> float:
     return alone * (SEARCH if simulation.disturbance.blunders > 0.0 else 1.0)
 
 
-def scatter_of(simulation: Simulation, sums: RunSums) -> MonteCarloScatter:
+def scatter_of(simulation: NetworkSimulation, sums: RunSums) -> MonteCarloScatter:
     """Scatter of the runs, compared with the claimed uncertainties and the planned covariance.
 
     Raises EstimationError when no run converged.

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -13,8 +12,8 @@ from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.network.monte_carlo import (
     Disturbance,
     MonteCarloScatter,
+    NetworkSimulation,
     RunSums,
-    Simulation,
     chunks,
     scatter_of,
     seconds_per_run,
@@ -28,8 +27,8 @@ from catseye.verdict import Verdict
 LARGEST_RATIO = 1.2  # largest acceptable departure over claim in the Monte Carlo
 WORTH_PROCESSES_S = 3.0  # s, processor time of a Monte Carlo from which other processes save more than their start
 
-Chunk = tuple[Simulation, int, int]  # its first run, and their number
-RunChunks = Callable[[Sequence[Chunk]], Sequence[dict[str, Any]]]  # `chunk_object` of each
+Chunk = tuple[NetworkSimulation, int, int]  # its first run, and their number
+RunChunks = Callable[[Sequence[Chunk]], Sequence[dict[str, object]]]  # `chunk_object` of each
 
 
 @dataclass(frozen=True)
@@ -119,13 +118,14 @@ def planned(
     options: PlanOptions | None = None,
     *,
     run: RunChunks | None = None,
+    apart: bool = False,
     progress: Progress | None = None,
 ) -> PlannedNetwork:
     """Network before it is measured.
 
     network    observed values are not used
     options    points of interest, time, Monte Carlo
-    run        as for `monte_carlo_scatter`
+    run, apart   as for `monte_carlo_scatter`
     progress   called with (what, done, of how many)
 
     Raises EstimationError where the network floats.
@@ -137,7 +137,7 @@ def planned(
         picked = schedule(found, budget_s=options.budget_s, shot_s=options.shot_s)
     drawn = None
     if options.monte_carlo.runs:
-        drawn = monte_carlo_scatter(found.solution, options.monte_carlo, run=run, progress=progress)
+        drawn = monte_carlo_scatter(found.solution, options.monte_carlo, run=run, apart=apart, progress=progress)
     return PlannedNetwork(adjusted_network(found.solution), found, picked, drawn)
 
 
@@ -169,6 +169,7 @@ def monte_carlo_scatter(
     monte_carlo: MonteCarloOptions,
     *,
     run: RunChunks | None = None,
+    apart: bool = False,
     progress: Progress | None = None,
 ) -> MonteCarloScatter:
     """Monte Carlo simulation of a planned network, measured many times with external errors and adjusted each time.
@@ -176,6 +177,7 @@ def monte_carlo_scatter(
     solution      of the network with its predicted observations; its coordinates are the truth
     monte_carlo   number of simulations and their errors
     run           runs chunks elsewhere; None: here, one after the other
+    apart         True: elsewhere, however short
     progress      called with (what, done, of how many)
 
     The result depends on the options and the network, not on where or in which order chunks run. Raises
@@ -185,16 +187,16 @@ def monte_carlo_scatter(
     disturbance = Disturbance(
         common_ppm=o.air_ppm, station_ppm=o.station_ppm, refraction=o.refraction, blunders=o.blunders
     )
-    simulation = Simulation.of(solution, seed=o.seed, disturbance=disturbance)
+    simulation = NetworkSimulation.of(solution, seed=o.seed, disturbance=disturbance)
     parts = chunks(simulation, o.runs)
-    if run is not None and o.runs * seconds_per_run(simulation) > WORTH_PROCESSES_S:
+    if run is not None and (apart or o.runs * seconds_per_run(simulation) > WORTH_PROCESSES_S):
         found = [RunSums.from_object(content) for content in run([(simulation, *part) for part in parts])]
     else:
         found = [_chunk_sums(simulation, *part, progress=_part_of(progress, part[0], o.runs)) for part in parts]
     return scatter_of(simulation, sum(found[1:], found[0]))
 
 
-def chunk_object(simulation: Simulation, first: int, count: int) -> dict[str, Any]:
+def chunk_object(simulation: NetworkSimulation, first: int, count: int) -> dict[str, object]:
     """Sums over some runs as an object for JSON, computed in any process.
 
     simulation   of a network
@@ -204,7 +206,7 @@ def chunk_object(simulation: Simulation, first: int, count: int) -> dict[str, An
     return _chunk_sums(simulation, first, count).to_object()
 
 
-def _chunk_sums(simulation: Simulation, first: int, count: int, *, progress: Progress | None = None) -> RunSums:
+def _chunk_sums(simulation: NetworkSimulation, first: int, count: int, *, progress: Progress | None = None) -> RunSums:
     options = AdjustmentOptions(reject=simulation.disturbance.blunders > 0.0)
 
     def solve(drawn: ObservationNetwork) -> NetworkSolution:
