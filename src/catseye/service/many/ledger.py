@@ -62,6 +62,12 @@ def is_ledger(folder: Path) -> bool:
     return isinstance(found, dict) and found.get("format") == FORMAT
 
 
+def remove(folder: Path) -> None:
+    """Remove a ledger whose run is over; nothing that is no ledger."""
+    if is_ledger(folder):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def content_of(inputs: Sequence[Path], earlier: Files | None = None, hashed: float = 0.0) -> Files:
     """Size, time and SHA-256 of each input file; of a folder's, each beneath it; none of a missing one.
 
