@@ -120,6 +120,6 @@ def test_a_file_cut_off_or_missing_is_named(tmp_path):
 def test_a_damaged_entry_of_the_index_is_named(tmp_path):
     archive = written_year(tmp_path / "a", 2, 5, seed=1)
     entry = tmp_path / f"a/index/{archive.nights[0]}.json"
-    flip(entry, entry.read_bytes().index(b"ciddor"))
+    flip(entry, entry.read_bytes().index(b"campaign"))
     with pytest.raises(InputError, match=f"{entry.name}: differs from its SHA-256: damaged"):
         open_archive(tmp_path / "a")

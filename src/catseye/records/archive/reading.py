@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.records.archive.index import ArchivedFile, ArchivedNight, JoinedYear, damaged, read_entry
-from catseye.records.archive.layout import FORMAT, HEAD, INDEX, Field, table_layout
+from catseye.records.archive.index import ArchivedFile, ArchivedNight, JoinedYear, damaged, night_path, read_entry
+from catseye.records.archive.layout import FORMAT, HEAD, INDEX, JOINED, Field, table_layout
 from catseye.records.archive.parquet import footer_sha256, scale_module, schema
 from catseye.records.files.reading import toml_of
 from catseye.records.files.refusal import refusal, unreadable
@@ -115,6 +115,33 @@ def read_index(directory: Path) -> tuple[ArchiveFolder, list[InputError]]:
     return ArchiveFolder(directory, ordered, joined), problems
 
 
+def intact_night(directory: Path, night: str) -> ArchivedNight | None:
+    """Entry of a night whose files are all as they were written; None where it is not in the archive, or damaged.
+
+    Raises InputError for a damaged file of its year's joined tables.
+    """
+    for path in sorted((directory / INDEX).glob(f"{JOINED}-*.json")):
+        year = read_entry(directory, path.relative_to(directory))
+        if isinstance(year, JoinedYear) and night in year.nights:
+            for file in year.files:
+                refuse_damaged(directory, file)
+            return year.nights[night] if _is_intact(directory, year.nights[night]) else None
+    try:
+        entry = read_entry(directory, night_path(night))
+    except InputError:
+        return None
+    return entry if isinstance(entry, ArchivedNight) and _is_intact(directory, entry) else None
+
+
+def _is_intact(directory: Path, entry: ArchivedNight) -> bool:
+    try:
+        for file in entry.files:
+            refuse_damaged(directory, file)
+    except InputError:
+        return False
+    return True
+
+
 def refuse_foreign(directory: Path) -> None:
     """Raise InputError unless the directory is an archive of a known version."""
     head = directory / HEAD
@@ -201,6 +228,24 @@ def _scanned(
         for file in files:
             refuse_damaged(archive.directory, file)
         raise refusal(str(archive.directory), f"table {kind} cannot be read: {problem}") from problem
+
+
+def rows_of_nights(archive: ArchiveFolder, kind: str, nights: Iterable[str]) -> Any:
+    """All rows of some nights in a table, sorted as `read_table` sorts, as a table of pyarrow; None for no file.
+
+    Raises InputError, naming the file, for one that differs from its SHA-256.
+    """
+    names = tuple(nights)
+    files = archive.files(kind, nights=names)
+    if not files:
+        return None
+    for file in files:
+        refuse_damaged(archive.directory, file)
+    layout = table_layout(kind)
+    table = _scanned(archive, kind, files, list(layout.names), {"night": names}, (None, None))
+    key = layout.fields[0].name
+    order = np.lexsort((_array(table.column("mjd"))[0], _ranks(_array(table.column(key)))))
+    return table.take(order).cast(schema(kind))
 
 
 def refuse_damaged(directory: Path, file: ArchivedFile, *, footer: bool = False) -> None:
