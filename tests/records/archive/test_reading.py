@@ -42,7 +42,7 @@ def test_a_series_of_one_point_shows_the_step_that_was_put_in(year):
     assert len(series["mjd"]) == NIGHTS - 1
     other = read_table(year, "points", ["z"], where={"point": "ZP00004"})["z"]
     assert not np.allclose(series["z"], other)
-    assert np.allclose(series["zz"], 120e-6**2)
+    assert np.allclose(np.sqrt(series["zz"]), 120e-6, rtol=0.6)
     late = series["mjd"] > series["mjd"][0] + 5.5
     assert series["z"][late].mean() - series["z"][~late].mean() == pytest.approx(0.01, abs=5e-3)
 

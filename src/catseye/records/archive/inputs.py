@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.errors import InputError
 from catseye.records.archive.index import damaged
-from catseye.records.archive.layout import INPUTS, SAMPLES
+from catseye.records.archive.layout import INPUTS
 from catseye.records.archive.parquet import scale_module
 from catseye.records.archive.provenance import NightProvenance, read_provenance
 from catseye.records.archive.reading import ArchiveFolder, refuse_damaged
@@ -37,9 +37,7 @@ def restore_inputs(archive: ArchiveFolder, night: str, sink: Sink) -> NightProve
     if packed is None:
         raise refusal(str(archive.directory), f"night {entry.night} has no inputs in the archive")
     hashes = {file.path: file.sha256 for file in provenance.inputs}
-    for file in entry.files:
-        if file.kind in (INPUTS, SAMPLES):
-            refuse_damaged(archive.directory, file)
+    refuse_damaged(archive.directory, packed)
     path = archive.directory / packed.path
     missing = set(hashes)
 
