@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from catseye.api.positions import locate
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
+    from catseye.api.scale.archive import archive, restore
     from catseye.api.scale.many import reduce_nights
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
@@ -74,6 +75,7 @@ FACE = {  # file of catseye.api -> its exported names
     "positions": ("locate",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
+    "scale.archive": ("archive", "restore"),
     "scale.many": ("reduce_nights",),
     "steering": ("point", "track"),
     "structure": ("structure",),
@@ -93,6 +95,7 @@ __all__ = [
     "acoustic",
     "adjust",
     "air",
+    "archive",
     "backup_journal",
     "baseline",
     "beam",
@@ -127,6 +130,7 @@ __all__ = [
     "refractometer",
     "replay",
     "report_of",
+    "restore",
     "safety",
     "save",
     "save_triplet_form",
