@@ -23,6 +23,8 @@ class NightContent:
     directory       of the inputs; None without inputs
     inputs          paths of the inputs, relative to it
     samples         the one of them that holds samples as an array of NumPy; "" without samples
+    periods         (rows of samples,) samples of a cycle
+    cycles          (rows of samples,) whole cycles at the start of a row
     """
 
     night: str
@@ -35,3 +37,10 @@ class NightContent:
     directory: Path | None = None
     inputs: Sequence[str] = field(default=())
     samples: str = ""
+    periods: np.ndarray | None = None
+    cycles: np.ndarray | None = None
+
+
+def broadcast(columns: Mapping[str, Any], rows: int) -> Columns:
+    """Columns of one length: single values repeated."""
+    return {name: np.broadcast_to(np.asarray(value), (rows,)) for name, value in columns.items()}

@@ -5,6 +5,7 @@ own.
 """
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
@@ -18,6 +19,7 @@ from catseye.records.files.refusal import refusal, unreadable
 NIGHT_FORMAT = "catseye-archive-night-1"
 YEAR_FORMAT = "catseye-archive-year-1"
 OWN_HASH = "sha256"
+HASH_DIGITS, LONGEST_NAME = 8, 80  # characters of an identifier
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ class ArchivedNight:
     source          `campaign` or `journal`
     inputs_sha256   over names and SHA-256 of the inputs
     inputs          files that come back when the night is restored
-    header          first bytes of the file of samples, hexadecimal; "" without samples
+    samples         path of the one of them that holds the samples; "" without samples
+    header          its bytes before the samples, hexadecimal
     versions        of catseye and its libraries that made the results
     provenance      settings, certificates and, of a journal, run and head of the chain
     files           of the archive; no tables where the year's tables are joined
@@ -77,6 +80,7 @@ class ArchivedNight:
     source: str
     inputs_sha256: str
     inputs: tuple[InputFile, ...]
+    samples: str
     header: str
     versions: Mapping[str, str]
     provenance: Mapping[str, Any]
@@ -98,6 +102,24 @@ class JoinedYear:
     year: int
     nights: Mapping[str, ArchivedNight]
     files: tuple[ArchivedFile, ...]
+
+
+def night_identifier(name: str, inputs_sha256: str) -> str:
+    """Identifier of a night, which is the name of its files.
+
+    name            of the campaign, or of a journal's site and run
+    inputs_sha256   over names and SHA-256 of the inputs
+
+    >>> night_identifier("night 01/b", "0123456789abcdef")
+    'night-01-b-01234567'
+    """
+    plain = re.sub(r"[^A-Za-z0-9_.]+", "-", name).strip("-.")[:LONGEST_NAME] or "night"
+    return f"{plain}-{inputs_sha256[:HASH_DIGITS]}"
+
+
+def inputs_hash(hashes: Mapping[str, str]) -> str:
+    """SHA-256 over the names and SHA-256 of files, hexadecimal."""
+    return sha256("".join(f"{name}\0{hashes[name]}\n" for name in sorted(hashes)).encode()).hexdigest()
 
 
 def night_path(night: str) -> PurePosixPath:

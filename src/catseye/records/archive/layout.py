@@ -181,9 +181,10 @@ CERTIFICATES = TableLayout(
         Field("sha256", "text", "", "SHA-256 of that file"),
         Field("valid_from", "float", "d", "date of measurement, Modified Julian Date; NaN where not stated"),
         Field("valid_until", "float", "d", "end of validity, Modified Julian Date; NaN where not stated"),
-        Field("value", "float", "", "the record's main value, such as the distance of a ranger's cube; NaN: none"),
+        Field("value", "float", "", "distance of a mirror's reference cube, height of a triplet's ball; NaN: none"),
         Field("u", "float", "", "its standard uncertainty"),
         Field("unit", "text", "", "unit of both"),
+        Field("ranger", "text", "", "ranger that carries the mirror, or stands on the monument"),
     ),
 )
 TABLES = {table.name: table for table in (NIGHTS, POINTS, POSES, ZEROS, WEATHER, RESIDUALS, CERTIFICATES)}

@@ -43,3 +43,11 @@ def footer_sha256(path: Path) -> str:
             return ""
         stream.seek(size - TAIL - length)
         return sha256(stream.read(length + TAIL)).hexdigest()
+
+
+def package_version(name: str) -> str:
+    """Version of a package of the extra; InputError if it is not installed."""
+    scale_module(name)
+    from importlib.metadata import version
+
+    return version(name)

@@ -206,15 +206,15 @@ def _scanned(
 def refuse_damaged(directory: Path, file: ArchivedFile, *, footer: bool = False) -> None:
     """Raise InputError, naming the file, unless it is as it was written.
 
-    footer   True to compare size and footer alone; pages have checksums of their own
+    footer   True to compare size and footer alone; pages and blocks of samples have checksums of their own
     """
     path = directory / file.path
     try:
         size = path.stat().st_size
         if size != file.size:
             raise damaged(path, f"holds {size} bytes, {file.size} in the index")
-        if footer and file.footer:
-            intact = footer_sha256(path) == file.footer
+        if footer:
+            intact = not file.footer or footer_sha256(path) == file.footer
         else:
             intact = file_sha256(path) == file.sha256
     except FileNotFoundError as problem:
