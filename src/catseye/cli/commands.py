@@ -22,6 +22,7 @@ ROOMS = (
     *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
+    "scale.query",
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples"),
@@ -32,6 +33,7 @@ SUBJECTS = {  # as `catseye --help` groups the commands
     "Air": ("air", "sound", "refractometer", "acoustic"),
     "Light": ("point", "link", "beam", "glass", "safety"),
     "A living site": ("simulate", "serve", "view", "zy", "ziy", "replay", "export", "journal"),
+    "Years of nights": ("query",),
     "Figures": ("plot",),
 }
 

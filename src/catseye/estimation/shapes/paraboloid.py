@@ -139,9 +139,7 @@ def fit_paraboloid(
     that times cos i = 1 / sqrt(1 + r^2/4f^2). Raises EstimationError for too few points and for points that do not
     determine the parameters.
     """
-    placed = place_paraboloid(
-        points, nominal, focal_length=focal_length, free=free, weights=weights, measure=measure
-    )
+    placed = place_paraboloid(points, nominal, focal_length=focal_length, free=free, weights=weights, measure=measure)
     tilts = nominal.rotation[:, :2]
     free, normal, design, gain = placed.free, placed.normal, placed.design, placed.gain
     translation, focal = placed.translation, placed.focal_length

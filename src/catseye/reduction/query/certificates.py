@@ -77,7 +77,7 @@ def night_certificates(span: ArchiveSpan, night: str) -> NightCertificates:
 
 def _validity(mjd: float, start: float, end: float) -> Validity:
     """Validity at a time; the last day itself is valid, and nan states nothing."""
-    if start > mjd + 1.0:  # a date has no hour: the day of the night is not later
+    if np.floor(start) > np.floor(mjd):  # a date has no hour; False for nan
         return Validity.LATER
     if np.isnan(end):
         return Validity.UNLIMITED

@@ -3,12 +3,12 @@
 import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from catseye.errors import InputError
 from catseye.records.archive.reading import ArchiveFolder, read_table
+from catseye.records.query.rows import select_rows
 from catseye.verdict import Verdict
 
 
@@ -23,9 +23,9 @@ class ArchiveSpan:
     since: float | None = None
     until: float | None = None
 
-    def table(self, kind: str, *columns: str, **where: Any) -> dict[str, np.ndarray]:
-        """Columns of a table within the span, of the rows whose columns equal `where`."""
-        return read_table(self.archive, kind, columns, where=where, since=self.since, until=self.until)
+    def table(self, kind: str, *columns: str, **where: str) -> dict[str, np.ndarray]:
+        """Columns of a table within the span, of the few rows whose columns equal `where`."""
+        return select_rows(self.archive, kind, columns, where, since=self.since, until=self.until)
 
     def refuse_empty(self, kind: str, column: str, name: str) -> None:
         """Raise InputError for a name without a row: unknown, or outside the span."""
