@@ -20,8 +20,8 @@ class YearTruth:
     """What a simulated year holds beneath its noise; lengths in metres, `per year` of 365.25 days.
 
     start             MJD of the first night's middle; a night follows each day
-    u                 (3,) standard uncertainties of a coordinate
-    correlation       of x and y
+    u                 (3,) standard uncertainties of a coordinate, of the usual point and night
+    correlation       of x and y, likewise
     expansion         per deg C, of the whole structure about its origin, from 10 deg C
     sag               of a dish prism along z at the horizon less at the zenith, times its x over 50 m
     drift             velocity in m per year by point, (3,)
@@ -148,10 +148,17 @@ def _nights_row(common, mjd, points, rng):
     return _broadcast(row, 1)
 
 
-def _points(k, rng, truth, place, names, bodies, common):
+def covariances(truth, rng, count):
+    """Covariance (count, 3, 3) m2 of each point in a night: some 20 % off the truth's strength, turned a little."""
     u = np.array(truth.u)
-    covariance = np.diag(u**2)
-    covariance[0, 1] = covariance[1, 0] = truth.correlation * u[0] * u[1]
+    common = np.diag(u**2)
+    common[0, 1] = common[1, 0] = truth.correlation * u[0] * u[1]
+    mixing = np.eye(3) + 0.05 * rng.standard_normal((count, 3, 3))
+    strength = np.exp(0.2 * rng.standard_normal(count))[:, None, None]
+    return strength * (mixing @ common @ np.swapaxes(mixing, 1, 2))
+
+
+def _points(k, rng, truth, place, names, bodies, common):
     x = place * (1.0 + truth.expansion * (common["temperature_c"] - 10.0))
     dish = np.array(bodies) == "dish prism"
     x[dish, 2] -= truth.sag * np.cos(common["elevation"]) * place[dish, 0] / 50.0
@@ -162,12 +169,13 @@ def _points(k, rng, truth, place, names, bodies, common):
         x[rows[name]] += np.array(step) * (k >= first)
     for (when, name), step in truth.outliers.items():
         x[rows[name]] += np.array(step) * (k == when)
-    x = x + rng.multivariate_normal(np.zeros(3), covariance, len(names))
+    covariance = covariances(truth, rng, len(names))
+    x = x + np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), rng.standard_normal((len(names), 3)))
     columns = {
         "point": names,
         "body": bodies,
         **{axis: x[:, i] for i, axis in enumerate("xyz")},
-        **{f"{'xyz'[i]}{'xyz'[j]}": covariance[i, j] for i in range(3) for j in range(i, 3)},
+        **{f"{'xyz'[i]}{'xyz'[j]}": covariance[:, i, j] for i in range(3) for j in range(i, 3)},
         "shots": rng.integers(3, 9, len(names)),
         **common,
     }

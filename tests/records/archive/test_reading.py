@@ -42,7 +42,7 @@ def test_a_series_of_one_point_shows_the_step_that_was_put_in(year):
     assert len(series["mjd"]) == NIGHTS - 1
     other = read_table(year, "points", ["z"], where={"point": "ZP00004"})["z"]
     assert not np.allclose(series["z"], other)
-    assert np.allclose(series["zz"], 120e-6**2)
+    assert np.allclose(np.sqrt(series["zz"]), 120e-6, rtol=0.6)
     late = series["mjd"] > series["mjd"][0] + 5.5
     assert series["z"][late].mean() - series["z"][~late].mean() == pytest.approx(0.01, abs=5e-3)
 
@@ -120,6 +120,6 @@ def test_a_file_cut_off_or_missing_is_named(tmp_path):
 def test_a_damaged_entry_of_the_index_is_named(tmp_path):
     archive = written_year(tmp_path / "a", 2, 5, seed=1)
     entry = tmp_path / f"a/index/{archive.nights[0]}.json"
-    flip(entry, entry.read_bytes().index(b"ciddor"))
+    flip(entry, entry.read_bytes().index(b"campaign"))
     with pytest.raises(InputError, match=f"{entry.name}: differs from its SHA-256: damaged"):
         open_archive(tmp_path / "a")

@@ -34,7 +34,7 @@ def create_archive(directory: Path) -> None:
     except OSError as problem:
         raise InputError(f"{directory}: cannot be written: {problem.strerror or problem}") from problem
     head = f'format = "{FORMAT}"\ncatseye = "{__version__}"  # that made it\n'
-    write_file(directory, PurePosixPath(HEAD), lambda path: path.write_text(head, encoding="utf-8"))
+    write_text(directory, PurePosixPath(HEAD), head)
 
 
 @contextmanager
@@ -91,6 +91,11 @@ def write_file(
     return ArchivedFile(str(path), kind, size, digest, footer, rows)
 
 
+def write_text(directory: Path, path: PurePosixPath, text: str, *, kind: str = "") -> ArchivedFile:
+    """Write a text of the archive whole; arguments as for `write_file`."""
+    return write_file(directory, path, lambda fresh: fresh.write_text(text, encoding="utf-8"), kind=kind)
+
+
 def _flush_folder(folder: Path) -> None:
     """Make a rename in a folder last through a loss of power."""
     descriptor = os.open(folder, os.O_RDONLY)
@@ -103,5 +108,5 @@ def _flush_folder(folder: Path) -> None:
 
 def _sweep(directory: Path) -> None:
     """Remove temporary files of a process that was killed."""
-    for path in directory.rglob(f"{TEMPORARY}*"):
-        path.unlink(missing_ok=True)
+    for path in list(directory.rglob(f"{TEMPORARY}*")):
+        Unfinished(str(path))()

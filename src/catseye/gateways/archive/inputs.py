@@ -3,13 +3,15 @@
 import os
 import tarfile
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from hashlib import file_digest
 from pathlib import Path
 from typing import BinaryIO
 
 from catseye.errors import InputError
-from catseye.records.archive.index import InputFile
+from catseye.gateways.archive.content import NightInputs
 from catseye.records.archive.parquet import scale_module
+from catseye.records.archive.provenance import InputFile
 
 
 def files_below(directory: Path) -> list[str]:
@@ -28,6 +30,17 @@ def files_below(directory: Path) -> list[str]:
                 raise InputError(f"{path}: is no file (expected files and folders in a campaign)")
             paths.append(path.relative_to(directory).as_posix())
     return sorted(paths)
+
+
+def night_inputs(night: str, sha256: str, directory: Path) -> NightInputs:
+    """Inputs of a night that is archived now: all files of a directory.
+
+    night    identifier
+    sha256   that identifies the inputs
+    """
+    files = tuple(files_below(directory))
+    size = sum((directory / path).stat().st_size for path in files)
+    return NightInputs(night=night, sha256=sha256, directory=directory, files=files, size=size, when=datetime.now(UTC))
 
 
 def input_file(directory: Path, path: str) -> InputFile:

@@ -4,14 +4,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from catseye.gateways.writers.output import new_directory
-from catseye.records.archive.index import ArchivedNight
 from catseye.records.archive.inputs import restore_inputs
+from catseye.records.archive.provenance import NightProvenance
 from catseye.records.archive.reading import ArchiveFolder
 
 FOLDERS = ("mirrors", "monuments", "triplets")  # of a campaign, even if empty
 
 
-def write_restored(archive: ArchiveFolder, night: str, directory: Path) -> ArchivedNight:
+def write_restored(archive: ArchiveFolder, night: str, directory: Path) -> NightProvenance:
     """Write a night's files as they were, whole or not at all.
 
     directory   new, or empty
@@ -28,7 +28,7 @@ def write_restored(archive: ArchiveFolder, night: str, directory: Path) -> Archi
                 for piece in pieces:
                     stream.write(piece)
 
-        entry = restore_inputs(archive, night, write)
+        provenance = restore_inputs(archive, night, write)
         for name in FOLDERS:
             (fresh / name).mkdir(exist_ok=True)
-    return entry
+    return provenance

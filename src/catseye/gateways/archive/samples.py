@@ -1,26 +1,28 @@
 """Raw samples as a blosc2 frame."""
 
+import errno
 from pathlib import Path
+from shutil import disk_usage
 
 import numpy as np
 
 from catseye.records.archive.codec import Samples, encoded
 from catseye.records.archive.parquet import scale_module
-from catseye.records.archive.samples import CHECKSUMS, FRAME_FORMAT, META, PERIODS, SHOTS, checksum
+from catseye.records.archive.samples import CHECKSUMS, FRAME_FORMAT, META, PERIODS, SHOTS, SampleFrame, checksum
 
 LEVEL = 1  # of zstd: with a block of a whole chunk as small as level 9 with blosc2's own, and some 50 times as fast
 BLOCK = 2**20  # bytes
 
 
 def write_samples(path: Path, samples: Samples, periods: np.ndarray, cycles: np.ndarray) -> None:
-    """Write samples so that they come back bit for bit.
+    """Write samples, and read them back to see that they come back bit for bit.
 
     path      of the new file
     samples   (n, width), mapped or in memory; one chunk at a time is touched
     periods   (n,) samples of a cycle of each row, 1 to width
     cycles    (n,) whole cycles at the start of each row
 
-    Raises OSError: a full disk.
+    Raises OSError or InputError: a full disk.
     """
     blosc2 = scale_module("blosc2")
     n, width = samples.shape
@@ -44,8 +46,12 @@ def write_samples(path: Path, samples: Samples, periods: np.ndarray, cycles: np.
         schunk.vlmeta[META] = {"format": FRAME_FORMAT, "shape": [n, width], "shots": SHOTS, "columns": columns}
         schunk.vlmeta[PERIODS] = periods.astype("<u4").tobytes()
         schunk.vlmeta[CHECKSUMS] = np.array(checksums, "<u4").tobytes()
-    except RuntimeError as problem:
-        raise OSError(None, f"{problem} (a full disk?)") from problem
+        del schunk
+        if sum(len(block) for block in SampleFrame.open(path).blocks()) != n:
+            raise RuntimeError("samples did not come back as they were written")
+    except RuntimeError as problem:  # blosc2's, without a number
+        full = disk_usage(path.parent).free < size
+        raise OSError(errno.ENOSPC if full else errno.EIO, f"{'disk full: ' * full}{problem}") from problem
 
 
 def _words(block: Samples, periods: np.ndarray, cycles: np.ndarray, columns: int) -> np.ndarray:

@@ -7,14 +7,15 @@ import numpy as np
 
 from catseye.errors import InputError
 from catseye.gateways.archive.content import Columns, NightContent
-from catseye.gateways.archive.files import write_file
+from catseye.gateways.archive.files import write_file, write_text
 from catseye.gateways.archive.inputs import input_file, write_inputs
 from catseye.gateways.archive.samples import write_samples
 from catseye.gateways.archive.tables import write_table
-from catseye.gateways.writers.objects import versions
-from catseye.records.archive.index import ArchivedFile, ArchivedNight, InputFile, entry_text, night_path
-from catseye.records.archive.layout import INPUTS, SAMPLES, TABLES, year_folder, year_of
+from catseye.gateways.writers.objects import plain, versions
+from catseye.records.archive.index import ArchivedFile, ArchivedNight, entry_text, night_path
+from catseye.records.archive.layout import INPUTS, PROVENANCE, SAMPLES, TABLES, year_folder, year_of
 from catseye.records.archive.parquet import package_version
+from catseye.records.archive.provenance import InputFile, NightProvenance, provenance_text
 
 PACKAGES = ("pyarrow", "blosc2")
 
@@ -29,6 +30,16 @@ def write_night(directory: Path, content: NightContent) -> ArchivedNight:
         _table(directory, year, content.night, kind, content.tables[kind]) for kind in TABLES if kind in content.tables
     ]
     inputs, header = ((), b"") if content.directory is None else _inputs(directory, year, content, files)
+    provenance = NightProvenance(
+        night=content.night,
+        inputs=inputs,
+        samples=content.samples,
+        header=header.hex(),
+        versions={**versions(), **{name: package_version(name) for name in PACKAGES}},
+        details=plain(content.provenance),
+    )
+    path = year_folder(PROVENANCE, year) / f"{content.night}.json"
+    files.append(write_text(directory, path, provenance_text(provenance), kind=PROVENANCE))
     entry = ArchivedNight(
         night=content.night,
         year=year,
@@ -36,21 +47,11 @@ def write_night(directory: Path, content: NightContent) -> ArchivedNight:
         last=content.last,
         source=content.source,
         inputs_sha256=content.inputs_sha256,
-        inputs=inputs,
-        samples=content.samples,
-        header=header.hex(),
-        versions={**versions(), **{name: package_version(name) for name in PACKAGES}},
-        provenance=content.provenance,
+        origin=content.origin,
         files=tuple(files),
     )
-    write_entry(directory, entry)
+    write_text(directory, night_path(entry.night), entry_text(entry))
     return entry
-
-
-def write_entry(directory: Path, entry: ArchivedNight) -> None:
-    """Write a night's entry in the index."""
-    text = entry_text(entry)
-    write_file(directory, night_path(entry.night), lambda path: path.write_text(text, encoding="utf-8"))
 
 
 def _table(directory: Path, year: int, night: str, kind: str, columns: Columns) -> ArchivedFile:

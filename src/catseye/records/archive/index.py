@@ -9,16 +9,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from hashlib import sha256
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from catseye.errors import InputError
-from catseye.records.archive.layout import INDEX, JOINED
+from catseye.records.archive.layout import INDEX, JOINED, TABLES
 from catseye.records.files.refusal import refusal, unreadable
 
 NIGHT_FORMAT = "catseye-archive-night-1"
 YEAR_FORMAT = "catseye-archive-year-1"
-OWN_HASH = "sha256"
+SEAL, DOCUMENT, END = '{"sha256": "', '",\n"document": ', "}\n"  # around digest and document
 HASH_DIGITS, LONGEST_NAME = 8, 80  # characters of an identifier
 
 
@@ -43,20 +43,6 @@ class ArchivedFile:
 
 
 @dataclass(frozen=True)
-class InputFile:
-    """File of a night before it was archived.
-
-    path        relative to the campaign
-    size        bytes
-    sha256      of the content
-    """
-
-    path: str
-    size: int
-    sha256: str
-
-
-@dataclass(frozen=True)
 class ArchivedNight:
     """Entry of the index.
 
@@ -65,11 +51,7 @@ class ArchivedNight:
     first, last     MJD of its earliest and latest row
     source          `campaign` or `journal`
     inputs_sha256   over names and SHA-256 of the inputs
-    inputs          files that come back when the night is restored
-    samples         path of the one of them that holds the samples; "" without samples
-    header          its bytes before the samples, hexadecimal
-    versions        of catseye and its libraries that made the results
-    provenance      settings, certificates and, of a journal, run and head of the chain
+    origin          of a journal's run its uuid: of several nights with one origin only the latest counts; else ""
     files           of the archive; no tables where the year's tables are joined
     """
 
@@ -79,12 +61,13 @@ class ArchivedNight:
     last: float
     source: str
     inputs_sha256: str
-    inputs: tuple[InputFile, ...]
-    samples: str
-    header: str
-    versions: Mapping[str, str]
-    provenance: Mapping[str, Any]
+    origin: str
     files: tuple[ArchivedFile, ...]
+
+    @property
+    def tables(self) -> "tuple[ArchivedFile, ...]":
+        """Its Parquet files; none where the year's tables are joined."""
+        return tuple(file for file in self.files if file.kind in TABLES)
 
     def file(self, kind: str) -> ArchivedFile | None:
         """File of a kind; None without one."""
@@ -134,33 +117,43 @@ def joined_path(year: int) -> PurePosixPath:
 
 def entry_text(entry: ArchivedNight | JoinedYear) -> str:
     """Content of an entry's file."""
-    document = {"format": NIGHT_FORMAT if isinstance(entry, ArchivedNight) else YEAR_FORMAT, **asdict(entry)}
-    return json.dumps({**document, OWN_HASH: _own_hash(document)}, indent=1, allow_nan=False) + "\n"
+    return sealed({"format": NIGHT_FORMAT if isinstance(entry, ArchivedNight) else YEAR_FORMAT, **asdict(entry)})
 
 
-def read_entry(directory: Path, path: Path) -> ArchivedNight | JoinedYear:
+def read_entry(directory: Path, path: PurePath) -> ArchivedNight | JoinedYear:
     """Entry of the index; InputError, naming the file, if it is damaged.
 
     path   relative to the archive
     """
-    try:
-        document = json.loads((directory / path).read_text(encoding="utf-8"))
-    except OSError as problem:
-        raise unreadable(str(directory / path), problem) from problem
-    except (ValueError, RecursionError) as problem:
-        raise damaged(directory / path, "is not JSON") from problem
-    if not isinstance(document, dict) or document.pop(OWN_HASH, None) != _own_hash(document):
-        raise damaged(directory / path, "differs from its SHA-256")
-    form = document.pop("format", None)
-    if form == NIGHT_FORMAT:
+    document = read_sealed(directory / path, NIGHT_FORMAT, YEAR_FORMAT)
+    if document.pop("format") == NIGHT_FORMAT:
         return _night(document)
-    if form == YEAR_FORMAT:
-        nights = {name: _night(entry) for name, entry in document["nights"].items()}
-        return JoinedYear(document["year"], nights, _files(document["files"]))
-    newer = "use a newer catseye"
-    raise refusal(
-        str(directory / path), f"format = {form!r} (expected {NIGHT_FORMAT!r} or {YEAR_FORMAT!r}; otherwise {newer})"
-    )
+    nights = {name: _night(entry) for name, entry in document["nights"].items()}
+    return JoinedYear(document["year"], nights, _files(document["files"]))
+
+
+def sealed(document: Mapping[str, Any]) -> str:
+    """JSON of a document within an object that holds its SHA-256."""
+    text = json.dumps(document, indent=1, allow_nan=False)
+    return f"{SEAL}{sha256(text.encode()).hexdigest()}{DOCUMENT}{text}{END}"
+
+
+def read_sealed(path: Path, *formats: str) -> dict[str, Any]:
+    """Document of a sealed file; InputError, naming it, if it is damaged or of another format."""
+    try:
+        raw = path.read_bytes()
+    except FileNotFoundError as problem:
+        raise damaged(path, "missing") from problem
+    except OSError as problem:
+        raise unreadable(str(path), problem) from problem
+    text = raw[len(SEAL) + 64 + len(DOCUMENT) : -len(END)]
+    if raw != f"{SEAL}{sha256(text).hexdigest()}{DOCUMENT}".encode() + text + END.encode():
+        raise damaged(path, "differs from its SHA-256")
+    document: dict[str, Any] = json.loads(text)
+    if document.get("format") not in formats:
+        expected = " or ".join(map(repr, formats))
+        raise refusal(str(path), f"format = {document.get('format')!r} (expected {expected}; use a newer catseye)")
+    return document
 
 
 def damaged(path: Path, problem: str) -> InputError:
@@ -169,13 +162,8 @@ def damaged(path: Path, problem: str) -> InputError:
 
 
 def _night(document: Mapping[str, Any]) -> ArchivedNight:
-    inputs = tuple(InputFile(**file) for file in document["inputs"])
-    return ArchivedNight(**{**document, "inputs": inputs, "files": _files(document["files"])})
+    return ArchivedNight(**{**document, "files": _files(document["files"])})
 
 
 def _files(documents: list[dict[str, Any]]) -> tuple[ArchivedFile, ...]:
     return tuple(ArchivedFile(**document) for document in documents)
-
-
-def _own_hash(document: Mapping[str, Any]) -> str:
-    return sha256(json.dumps(document, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

@@ -10,9 +10,10 @@ from typing import BinaryIO
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.records.archive.index import ArchivedNight, damaged
-from catseye.records.archive.layout import INPUTS, SAMPLES
+from catseye.records.archive.index import damaged
+from catseye.records.archive.layout import INPUTS
 from catseye.records.archive.parquet import scale_module
+from catseye.records.archive.provenance import NightProvenance, read_provenance
 from catseye.records.archive.reading import ArchiveFolder, refuse_damaged
 from catseye.records.archive.samples import sample_frame
 from catseye.records.files.refusal import refusal
@@ -23,22 +24,20 @@ PIECE = 2**20  # bytes read at once
 Sink = Callable[[str, Iterator[bytes]], None]
 
 
-def restore_inputs(archive: ArchiveFolder, night: str, sink: Sink) -> ArchivedNight:
-    """Hand each input file of a night on, and return the night's entry.
+def restore_inputs(archive: ArchiveFolder, night: str, sink: Sink) -> NightProvenance:
+    """Hand each input file of a night on, and return the night's provenance.
 
     night   identifier, or a beginning that only one has
     sink    called with a file's path, relative to the campaign, and its content in pieces, which it must use up
 
     Raises InputError: an unknown night, one without inputs, a damaged file, content that differs from its SHA-256.
     """
-    entry = archive.entry(night)
+    entry, provenance = archive.entry(night), read_provenance(archive, night)
     packed = entry.file(INPUTS)
     if packed is None:
         raise refusal(str(archive.directory), f"night {entry.night} has no inputs in the archive")
-    hashes = {file.path: file.sha256 for file in entry.inputs}
-    for file in entry.files:
-        if file.kind in (INPUTS, SAMPLES):
-            refuse_damaged(archive.directory, file)
+    hashes = {file.path: file.sha256 for file in provenance.inputs}
+    refuse_damaged(archive.directory, packed)
     path = archive.directory / packed.path
     missing = set(hashes)
 
@@ -53,11 +52,11 @@ def restore_inputs(archive: ArchiveFolder, night: str, sink: Sink) -> ArchivedNi
             hand_on(name, iter(lambda stream=stream: stream.read(PIECE), b""))  # type: ignore[misc]
     except (tarfile.TarError, EOFError) as problem:
         raise damaged(path, "is no complete tar file") from problem
-    if entry.samples:
-        hand_on(entry.samples, _sample_bytes(archive, entry))
+    if provenance.samples:
+        hand_on(provenance.samples, _sample_bytes(archive, provenance))
     if missing:
         raise damaged(path, f"lacks {min(missing)!r}")
-    return entry
+    return provenance
 
 
 def _members(path: Path) -> Iterator[tuple[str, BinaryIO]]:
@@ -77,11 +76,12 @@ def _members(path: Path) -> Iterator[tuple[str, BinaryIO]]:
         raise damaged(path, "is not as zstd wrote it") from problem
 
 
-def _sample_bytes(archive: ArchiveFolder, entry: ArchivedNight) -> Iterator[bytes]:
+def _sample_bytes(archive: ArchiveFolder, provenance: NightProvenance) -> Iterator[bytes]:
     """Content of the file of samples: its header, and the samples in its own order."""
-    header, frame = bytes.fromhex(entry.header), sample_frame(archive, entry.night)
+    header, frame = bytes.fromhex(provenance.header), sample_frame(archive, provenance.night)
     yield header
-    _, by_columns = checked_header(header_of(io.BytesIO(header), entry.samples), entry.samples)
+    name = provenance.samples
+    _, by_columns = checked_header(header_of(io.BytesIO(header), name), name)
     if by_columns:
         yield np.concatenate(list(frame.blocks())).T.astype("<i2", copy=False).tobytes()
         return

@@ -12,7 +12,7 @@ from catseye.errors import InputError
 FORMAT = "catseye-archive-1"
 HEAD = "archive.toml"  # identifies the directory
 INDEX = "index"  # a file a night, written last; a file a joined year
-SAMPLES, INPUTS = "samples", "inputs"
+SAMPLES, INPUTS, PROVENANCE = "samples", "inputs", "provenance"
 LOCK = "archive.lock"  # held while a night is written
 YEAR_PREFIX = "year="
 JOINED = "joined"  # first part of the name of a table's file of many nights

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.records.archive.index import ArchivedFile, ArchivedNight, JoinedYear, damaged, read_entry
-from catseye.records.archive.layout import FORMAT, HEAD, INDEX, Field, table_layout
+from catseye.records.archive.index import ArchivedFile, ArchivedNight, JoinedYear, damaged, night_path, read_entry
+from catseye.records.archive.layout import FORMAT, HEAD, INDEX, JOINED, Field, table_layout
 from catseye.records.archive.parquet import footer_sha256, scale_module, schema
 from catseye.records.files.reading import toml_of
 from catseye.records.files.refusal import refusal, unreadable
@@ -115,6 +115,33 @@ def read_index(directory: Path) -> tuple[ArchiveFolder, list[InputError]]:
     return ArchiveFolder(directory, ordered, joined), problems
 
 
+def intact_night(directory: Path, night: str) -> ArchivedNight | None:
+    """Entry of a night whose files are all as they were written; None where it is not in the archive, or damaged.
+
+    Raises InputError for a damaged file of its year's joined tables.
+    """
+    for path in sorted((directory / INDEX).glob(f"{JOINED}-*.json")):
+        year = read_entry(directory, path.relative_to(directory))
+        if isinstance(year, JoinedYear) and night in year.nights:
+            for file in year.files:
+                refuse_damaged(directory, file)
+            return year.nights[night] if _is_intact(directory, year.nights[night]) else None
+    try:
+        entry = read_entry(directory, night_path(night))
+    except InputError:
+        return None
+    return entry if isinstance(entry, ArchivedNight) and _is_intact(directory, entry) else None
+
+
+def _is_intact(directory: Path, entry: ArchivedNight) -> bool:
+    try:
+        for file in entry.files:
+            refuse_damaged(directory, file)
+    except InputError:
+        return False
+    return True
+
+
 def refuse_foreign(directory: Path) -> None:
     """Raise InputError unless the directory is an archive of a known version."""
     head = directory / HEAD
@@ -178,43 +205,54 @@ def _scanned(
     data, arrow = scale_module("pyarrow.dataset"), scale_module("pyarrow")
     for file in files:
         refuse_damaged(archive.directory, file, footer=True)
-    texts = [field.name for field in table_layout(kind).fields if field.kind == "text" and field.name in names]
-    form = data.ParquetFileFormat(
-        read_options=data.ParquetReadOptions(dictionary_columns=texts),
-        default_fragment_scan_options=data.ParquetFragmentScanOptions(page_checksum_verification=True),
-    )
+    pages = data.ParquetFragmentScanOptions(page_checksum_verification=True, pre_buffer=False)
+    form = data.ParquetFileFormat(default_fragment_scan_options=pages)
     expression = None
     tests = [_equals(data.field(name), values) for name, values in conditions.items()]
     tests += [data.field("mjd") >= span[0]] if span[0] is not None else []
     tests += [data.field("mjd") < span[1]] if span[1] is not None else []
     for test in tests:
         expression = test if expression is None else expression & test
-    fields = [
-        arrow.field(field.name, arrow.dictionary(arrow.int32(), arrow.string())) if field.name in texts else field
-        for field in schema(kind)
-    ]
     paths = [str(archive.directory / file.path) for file in files]
-    try:
-        source = data.dataset(paths, schema=arrow.schema(fields), format=form)
-        return source.to_table(columns=names, filter=expression)
+    try:  # text as plain strings: row groups are passed over by their statistics, which those of dictionaries are not
+        source = data.dataset(paths, schema=schema(kind), format=form)
+        return source.to_table(columns=names, filter=expression, use_threads=False)
     except (arrow.ArrowException, OSError) as problem:
         for file in files:
             refuse_damaged(archive.directory, file)
         raise refusal(str(archive.directory), f"table {kind} cannot be read: {problem}") from problem
 
 
+def rows_of_nights(archive: ArchiveFolder, kind: str, nights: Iterable[str]) -> Any:
+    """All rows of some nights in a table, sorted as `read_table` sorts, as a table of pyarrow; None for no file.
+
+    Raises InputError, naming the file, for one that differs from its SHA-256.
+    """
+    names = tuple(nights)
+    files = archive.files(kind, nights=names)
+    if not files:
+        return None
+    for file in files:
+        refuse_damaged(archive.directory, file)
+    layout = table_layout(kind)
+    table = _scanned(archive, kind, files, list(layout.names), {"night": names}, (None, None))
+    key = layout.fields[0].name
+    order = np.lexsort((_array(table.column("mjd"))[0], _ranks(_array(table.column(key)))))
+    return table.take(order)
+
+
 def refuse_damaged(directory: Path, file: ArchivedFile, *, footer: bool = False) -> None:
     """Raise InputError, naming the file, unless it is as it was written.
 
-    footer   True to compare size and footer alone; pages and blocks of samples have checksums of their own
+    footer   True to compare size and footer alone; pages have checksums of their own
     """
     path = directory / file.path
     try:
         size = path.stat().st_size
         if size != file.size:
             raise damaged(path, f"holds {size} bytes, {file.size} in the index")
-        if footer:
-            intact = not file.footer or footer_sha256(path) == file.footer
+        if footer and file.footer:
+            intact = footer_sha256(path) == file.footer
         else:
             intact = file_sha256(path) == file.sha256
     except FileNotFoundError as problem:
@@ -243,13 +281,11 @@ def _equals(field: Any, condition: Any) -> Any:
 
 
 def _array(column: Any) -> tuple[np.ndarray, np.ndarray | None]:
-    """Values, or indices with the dictionary that they point into."""
-    if str(column.type).startswith("dictionary"):
-        array = column.unify_dictionaries().combine_chunks()
-        chunk = array.chunk(0) if hasattr(array, "chunk") else array
-        words = np.array(chunk.dictionary.to_pylist() or [""], dtype=np.str_)
-        return chunk.indices.to_numpy(zero_copy_only=False), words
-    return column.to_numpy(), None
+    """Values, or indices with the words that they point into."""
+    if str(column.type) != "string":
+        return column.to_numpy(), None
+    array = column.combine_chunks().dictionary_encode()
+    return array.indices.to_numpy(zero_copy_only=False), np.array(array.dictionary.to_pylist() or [""], dtype=np.str_)
 
 
 def _ranks(array: tuple[np.ndarray, np.ndarray | None]) -> np.ndarray:

@@ -48,14 +48,16 @@ class SampleFrame:
         try:
             schunk = blosc2.open(str(path), mode="r", dparams={"nthreads": 1})
             meta = schunk.vlmeta[META]
+            form, (rows, width), shots, columns = (meta[name] for name in ("format", "shape", "shots", "columns"))
             periods = np.frombuffer(schunk.vlmeta[PERIODS], "<u4")
             checksums = np.frombuffer(schunk.vlmeta[CHECKSUMS], "<u4")
-        except (RuntimeError, ValueError, KeyError, OSError) as problem:
+        except (RuntimeError, ValueError, KeyError, TypeError, OSError) as problem:
             raise damaged(path, "is no frame of samples") from problem
-        if meta["format"] != FRAME_FORMAT:
-            raise refusal(str(path), f"format = {meta['format']!r} (expected {FRAME_FORMAT!r}; use a newer catseye)")
-        rows, width = meta["shape"]
-        return SampleFrame(path, (rows, width), meta["shots"], meta["columns"], periods, checksums, schunk)
+        if form != FRAME_FORMAT:
+            raise refusal(str(path), f"format = {form!r} (expected {FRAME_FORMAT!r}; use a newer catseye)")
+        if len(periods) != rows or len(checksums) != -(-rows // shots):
+            raise damaged(path, "is no complete frame of samples")
+        return SampleFrame(path, (rows, width), shots, columns, periods, checksums, schunk)
 
     def block(self, number: int) -> Samples:
         """Samples of a chunk's rows; InputError if they differ from their checksum."""
@@ -103,12 +105,12 @@ def checksum(samples: Samples) -> int:
 
 
 def sample_frame(archive: ArchiveFolder, night: str) -> SampleFrame:
-    """Frame of a night's samples; InputError without samples, or for a file of another size."""
+    """Frame of a night's samples; InputError without samples, or for a file that differs from its SHA-256."""
     entry = archive.entry(night)
     file = entry.file("samples")
     if file is None:
         raise refusal(str(archive.directory), f"night {entry.night} has no samples in the archive")
-    refuse_damaged(archive.directory, file, footer=True)
+    refuse_damaged(archive.directory, file)
     return SampleFrame.open(archive.directory / file.path)
 
 
