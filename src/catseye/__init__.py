@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from catseye.api.result import save, show
     from catseye.api.scale.archive import archive, restore
     from catseye.api.scale.many import reduce_nights
+    from catseye.api.scale.query import query
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
@@ -77,6 +78,7 @@ FACE = {  # file of catseye.api -> its exported names
     "result": ("save", "show"),
     "scale.archive": ("archive", "restore"),
     "scale.many": ("reduce_nights",),
+    "scale.query": ("query",),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
@@ -125,6 +127,7 @@ __all__ = [
     "point",
     "pose",
     "predict_pointing",
+    "query",
     "reduce",
     "reduce_nights",
     "refractometer",
