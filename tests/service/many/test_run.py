@@ -2,6 +2,9 @@
 
 import json
 import multiprocessing
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -10,6 +13,8 @@ from catseye.errors import ArgumentError, InputError
 from catseye.service.many.ledger import opened
 from catseye.service.many.run import StoppedError, run_many
 from catseye.service.many.unit import Unit
+from process_scene import ends_with_us
+from repository import ROOT
 from service.many.many_scene import (
     backwards,
     broken,
@@ -41,8 +46,6 @@ def test_each_process_has_one_thread_of_linear_algebra_and_the_caller_its_own(mo
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     (found,) = run_many(units(square, 1), processes=1)
     assert found.value == {"square": 0, "third": 0.0, "threads": "1"}
-    import os
-
     assert os.environ["OPENBLAS_NUM_THREADS"] == "2"
 
 
@@ -185,6 +188,34 @@ def test_an_interrupted_call_ends_its_processes_and_notes_what_is_done(tmp_path)
     with pytest.raises(KeyboardInterrupt) as told:
         run_many(units(square, 4), processes=1, ledger=tmp_path / "ledger", progress=interrupt)
     assert told.value.__notes__ == ["2 of 4 are done; resume continues from there"]
-    assert not [child for child in multiprocessing.active_children() if child.is_alive()]
+    for child in multiprocessing.active_children():
+        child.join(1.0)  # its files are closed a moment before it is gone
+        assert not child.is_alive()
     states_then = states(run_many(units(square, 4), processes=1, ledger=tmp_path / "ledger", resume=True))
     assert states_then == ["resumed", "resumed", "done", "done"]
+
+
+SCRIPT = """
+from catseye.service.many.run import run_many
+from service.many.many_scene import square, units
+print([each.value["square"] for each in run_many(units(square, 3), processes=2)])
+"""
+OWN = """
+from catseye.service.many.run import run_many
+from catseye.service.many.unit import Unit
+def own(number):
+    return {"cube": number**3}
+if __name__ == "__main__":
+    print([each.value["cube"] for each in run_many([Unit(str(k), own, (k,)) for k in range(3)], processes=2)])
+"""
+
+
+@pytest.mark.parametrize(("text", "said"), [(SCRIPT, "[0, 1, 4]"), (OWN, "[0, 1, 8]")])
+def test_a_script_needs_no_guard_unless_it_defines_the_work(tmp_path, text, said):
+    script = tmp_path / "script.py"
+    script.write_text(text)
+    place = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT / 'tests'}"}
+    done = subprocess.run(
+        [sys.executable, script], check=False, capture_output=True, text=True, env=place, preexec_fn=ends_with_us()
+    )
+    assert (done.stdout.strip(), done.stderr, done.returncode) == (said, "", 0)
