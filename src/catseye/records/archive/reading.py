@@ -1,6 +1,7 @@
 """Reading of an archive: its index, and columns of its tables."""
 
 import os
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +14,6 @@ from catseye.errors import InputError
 from catseye.records.archive.index import ArchivedFile, ArchivedNight, JoinedYear, damaged, night_path, read_entry
 from catseye.records.archive.layout import FORMAT, HEAD, INDEX, JOINED, Field, table_layout
 from catseye.records.archive.parquet import footer_sha256, scale_module, schema
-from catseye.records.files.reading import toml_of
 from catseye.records.files.refusal import refusal, unreadable
 
 
@@ -152,7 +152,10 @@ def refuse_foreign(directory: Path) -> None:
         raise refusal(str(directory), f"{state} (expected an archive, as `catseye archive` writes it)") from problem
     except (OSError, UnicodeDecodeError) as problem:
         raise refusal(str(head), f"cannot be read: {problem}") from problem
-    form = toml_of(text, str(head)).get("format")
+    try:
+        form = tomllib.loads(text).get("format")
+    except tomllib.TOMLDecodeError as problem:
+        raise damaged(head, "is not TOML") from problem
     if form != FORMAT:
         raise refusal(str(head), f"format = {form!r} (expected {FORMAT!r}; a newer one needs a newer catseye)")
 
