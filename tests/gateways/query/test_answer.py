@@ -14,7 +14,7 @@ from catseye.gateways.query.summary import date_of
 from catseye.records.archive.reading import read_table
 from catseye.reduction.query.span import ArchiveSpan
 from catseye.reduction.query.surface import surface_series
-from query_scene import APERTURE, dish_archive
+from reduction.query.dish_scene import APERTURE, dish_archive
 
 TRUTH = YearTruth(zero_drift={"ZY110": 1e-3})
 

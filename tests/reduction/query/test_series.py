@@ -1,14 +1,18 @@
 """Series from an archive: points, rangers, poses, surfaces, certificates, nights, against truths that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from archive_scene import NEW_YEAR, U_ZERO, YearTruth, flip, written_year
+from archive_scene import NEW_YEAR, RANGERS, U_ZERO, YearTruth, flip, written_year, year_contents
 from catseye.constants import DEGREE
 from catseye.errors import InputError
+from catseye.gateways.archive.files import create_archive, sole_writer
+from catseye.gateways.archive.writer import write_night
 from catseye.geometry.antenna.frames import ground_from_reflector
-from catseye.records.archive.reading import read_table
-from catseye.reduction.query.certificates import Validity, night_certificates
+from catseye.records.archive.reading import open_archive, read_table
+from catseye.reduction.query.certificates import CertificateState, night_certificates
 from catseye.reduction.query.nights import night_rows
 from catseye.reduction.query.point import point_series
 from catseye.reduction.query.pose import pose_series
@@ -16,7 +20,18 @@ from catseye.reduction.query.ranger import ranger_series
 from catseye.reduction.query.span import ArchiveSpan
 from catseye.reduction.query.surface import surface_series
 from catseye.reduction.surface.shape import LitAperture, Prisms, shape_of
-from query_scene import APERTURE, ASTIGMATISM, FOCAL, LENGTHENING, NIGHTS, U_PRISM, dish_archive, posture, prisms, shape
+from reduction.query.dish_scene import (
+    APERTURE,
+    ASTIGMATISM,
+    FOCAL,
+    LENGTHENING,
+    NIGHTS,
+    U_PRISM,
+    dish_archive,
+    posture,
+    prisms,
+    shape,
+)
 
 STILL = YearTruth(expansion=0.0, sag=0.0, zero_drift={"ZY104": 1.2e-3}, zero_steps={})
 
@@ -38,11 +53,13 @@ def test_a_point_that_does_not_move_scatters_as_it_claims(still):
     series = point_series(ArchiveSpan(still), "ZP00003")
     assert len(series.night) == 120
     assert series.verdict.word == "good"
-    assert series.u[0].tolist() == pytest.approx(list(STILL.u))
+    rows = read_table(still, "points", ("xx", "yy", "zz"), where={"point": "ZP00003"})
+    assert series.u == pytest.approx(np.sqrt(np.column_stack(list(rows.values()))))
+    claim = np.sqrt(np.mean(series.u**2, axis=0))
     assert abs(series.mean.factor - 1.0) < 4 * np.sqrt(2 / (3 * 119))
     u_mean = np.sqrt(np.diag(series.mean.covariance))
-    assert u_mean.tolist() == pytest.approx([u / np.sqrt(120) for u in STILL.u])
-    assert np.all(np.abs(series.scatter / STILL.u - 1.0) < 4 / np.sqrt(2 * 119))
+    assert u_mean == pytest.approx(claim / np.sqrt(120), rel=0.1)
+    assert np.all(np.abs(series.scatter / claim - 1.0) < 4 / np.sqrt(2 * 119))
     truth = np.random.default_rng((1, 0)).uniform(-50.0, 50.0, (12, 3))[3]
     assert np.all(np.abs(series.mean.place - truth) < 4 * u_mean)
 
@@ -193,20 +210,20 @@ def test_a_dish_with_too_few_prisms_has_no_surface(tmp_path):
 def test_certificates_of_a_night(still):
     found = night_certificates(ArchiveSpan(still), still.nights[5])
     assert len(found.instrument) == 18
-    assert set(found.validity) == {Validity.VALID}
+    assert set(found.validity) == {CertificateState.VALID}
     assert found.verdict.word == "good"
     assert found.left[0] == pytest.approx(201.0 - 5.15)
 
 
 @pytest.mark.parametrize(
-    ("day", "validity"),
-    [(200, Validity.VALID), (201, Validity.EXPIRED), (-201, Validity.LATER), (-200, Validity.VALID)],
+    ("day", "state"),
+    [(200, "VALID"), (201, "EXPIRED"), (-201, "LATER"), (-200, "VALID")],
 )
-def test_the_last_day_itself_is_valid(tmp_path, day, validity):
+def test_the_last_day_itself_is_valid(tmp_path, day, state):
     archive = written_year(tmp_path / "archive", nights=1, points=5, truth=YearTruth(start=NEW_YEAR + day + 0.99))
     found = night_certificates(ArchiveSpan(archive), "year-000")
-    assert set(found.validity) == {validity}
-    assert (found.verdict.word == "good") is (validity is Validity.VALID)
+    assert {each.name for each in found.validity} == {state}
+    assert (found.verdict.word == "good") is (state == "VALID")
 
 
 def test_nights_come_in_order_of_time(still):
@@ -222,3 +239,63 @@ def test_a_damaged_file_stops_a_question(tmp_path):
     flip(path, 100)
     with pytest.raises(InputError, match=path.name):
         point_series(ArchiveSpan(archive), "ZP00003")
+
+
+def test_a_new_sheet_is_a_step_of_the_calibration_and_none_of_the_head(tmp_path):
+    """Night 40 on: a new sheet, whose D0 is 0.2 mm longer, so that the departures from it are 0.2 mm less."""
+
+    def resheeted(k, tables):
+        later = k >= 40
+        zeros, names = dict(tables["zeros"]), list(RANGERS)
+        zeros["value"] = zeros["value"] - 2e-4 * later * (np.arange(len(names)) == names.index("ZY105"))
+        zp = [f"ZP{name[2:]}" if name != "ZY106" or k >= 50 else "ZP999" for name in names]
+        d0 = [
+            0.18 + 2e-4 * later * (name == "ZY105") + 1e-3 * (place == "ZP999")
+            for name, place in zip(names, zp, strict=True)
+        ]
+        sheets = {
+            **tables["certificates"],
+            "instrument": zp,
+            "kind": np.full(len(names), "mirror"),
+            "value": d0,
+            "ranger": names,
+        }
+        return {**tables, "zeros": zeros, "certificates": sheets}
+
+    create_archive(tmp_path / "archive")
+    with sole_writer(tmp_path / "archive"):
+        for k, content in enumerate(year_contents(80, 5, 3, STILL)):
+            write_night(tmp_path / "archive", replace(content, tables=resheeted(k, content.tables)))
+    span = ArchiveSpan(open_archive(tmp_path / "archive"))
+    series = ranger_series(span, "ZY105")
+    assert sorted(set(np.round(series.prior, 9).tolist())) == [-2e-4, 0.0]
+    [drift] = series.drifts
+    assert abs(drift.rate) < 3.5 * drift.u_rate
+    assert drift.line.factor < 1.6
+    swapped = ranger_series(span, "ZY106")
+    assert set(swapped.head.tolist()) == {"ZP999", "ZP106"}
+    assert swapped.drifts[0].nights == 30
+
+
+def test_errors_common_to_all_heads_hide_no_observation(tmp_path):
+    """u of an archive holds them, and may exceed the sheet's; `u_adjusted` has what the night itself adds."""
+
+    def widened(tables):
+        zeros = tables["zeros"]
+        return {
+            **tables,
+            "zeros": {
+                **zeros,
+                "u_prior": np.full(len(RANGERS), 3.1e-5),
+                "u_adjusted": zeros["u"],
+                "u": np.full(len(RANGERS), 4e-5),
+            },
+        }
+
+    create_archive(tmp_path / "archive")
+    with sole_writer(tmp_path / "archive"):
+        for content in year_contents(3, 5, 3, STILL):
+            write_night(tmp_path / "archive", replace(content, tables=widened(content.tables)))
+    series = ranger_series(ArchiveSpan(open_archive(tmp_path / "archive")), "ZY105")
+    assert series.own[1] == pytest.approx((U_ZERO**-2 - 3.1e-5**-2) ** -0.5)
+    assert series.drifts[0].nights == 3

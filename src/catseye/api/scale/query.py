@@ -51,7 +51,7 @@ class QueryResult(Result):
         return self.to_table()
 
     def passages(self) -> "Sequence[Passage]":
-        """Answer in sentences."""
+        """Answer in a few sentences."""
         from catseye.gateways.query.answer import FORMS
 
         return FORMS[self.question].passages(self.answer)

@@ -14,7 +14,7 @@ from catseye.records.night.campaign import Campaign
 from catseye.records.site.folder import SiteFolder, mounts
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.head import head_unknowns
-from catseye.reduction.epoch.parameter import Parameter
+from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.night.digest import digest
 from catseye.verdict import Verdict
 from catseye.version import __version__
@@ -155,18 +155,23 @@ def _zeros(reduction: Reduction, common: dict[str, Any], temperature_c: float) -
     """Zeros, effects of heads and leakages; all of them are departures from the sheet, with expectation zero."""
     coordinates, campaign = reduction.coordinates, reduction.campaign
     u_zero = zero_priors(campaign, list(coordinates.zeros))
-    rows = [(name, ZERO, value, u, u_zero[name]) for name, (value, u) in coordinates.zeros.items()]
+    alone = coordinates.u_adjusted
+    rows = [
+        (name, ZERO, value, u, alone[str(Parameter(ParameterKind.ZERO, name))], u_zero[name])
+        for name, (value, u) in coordinates.zeros.items()
+    ]
     for name in coordinates.zeros:
         for unknown in head_unknowns(campaign, name):
             kind = unknown.quantity.kind
             for part in unknown.parts:
-                value, u = coordinates.heads[str(Parameter(kind, name, part))]
-                rows.append((name, f"{kind.name.lower()} {part}".strip(), value, u, unknown.u))
+                effect = str(Parameter(kind, name, part))
+                value, u = coordinates.heads[effect]
+                rows.append((name, f"{kind.name.lower()} {part}".strip(), value, u, alone[effect], unknown.u))
     for name, parts in coordinates.leakage.items():
         u_volt = campaign.mirror_of(name).u_leakage_volt
         prior = NAN if u_volt is None else u_volt
-        rows += [(name, LEAKAGE[k], parts[k], NAN, prior) for k in range(2)]
-    names = ("ranger", "parameter", "value", "u", "u_prior")
+        rows += [(name, LEAKAGE[k], parts[k], NAN, NAN, prior) for k in range(2)]
+    names = ("ranger", "parameter", "value", "u", "u_adjusted", "u_prior")
     columns = {column: [row[k] for row in rows] for k, column in enumerate(names)}
     return broadcast({**columns, "prior": 0.0, **common, "temperature_c": temperature_c}, len(rows))
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from catseye.reduction.query.point import PointSeries
     from catseye.reduction.query.pose import PoseSeries
     from catseye.reduction.query.ranger import RangerSeries
-    from catseye.reduction.query.surface import SurfaceSeries
+    from catseye.reduction.query.surface import SurfaceNights
 
 UNIX_EPOCH = 40587.0  # MJD of 1970-01-01, from which matplotlib counts days
 MICROMETRE = 1e-6  # m
@@ -59,7 +59,7 @@ def pose_figures(series: "PoseSeries") -> dict[str, Figure]:
     return _against(series, panels, columns=2)
 
 
-def surface_figures(series: "SurfaceSeries") -> dict[str, Figure]:
+def surface_figures(series: "SurfaceNights") -> dict[str, Figure]:
     """Focal length, rms and the terms that vary most, against date, elevation and temperature; map of the prisms."""
     focal, u_focal = series.column("focal_length") / MILLIMETRE, series.column("u_focal_length") / MILLIMETRE
     term, u_term = series.column("term") / MICROMETRE, series.column("u_term") / MICROMETRE
@@ -190,7 +190,7 @@ def _dated(ax: Any) -> None:
     ax.set_xlabel("date (UTC)")
 
 
-def _prisms(series: "SurfaceSeries") -> Figure:
+def _prisms(series: "SurfaceNights") -> Figure:
     """Mean half-path error and scatter of each prism over the nights, on the aperture."""
     with styled():
         figure = Figure(figsize=(WIDTH, 4.6), layout="constrained")

@@ -30,7 +30,7 @@ def sql_object(rows: "SqlRows") -> dict[str, Any]:
 
 
 def point_object(series: "PointSeries") -> dict[str, Any]:
-    """Point, frame and mean."""
+    """Point, frame and weighted mean."""
     place, covariance, factor = series.mean
     u = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return {

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from catseye.reduction.query.point import PointSeries
     from catseye.reduction.query.pose import PoseSeries
     from catseye.reduction.query.ranger import RangerSeries
-    from catseye.reduction.query.surface import SurfaceSeries
+    from catseye.reduction.query.surface import SurfaceNights
 
 MICROMETRE = 1e-6  # m
 DAY_ZERO = datetime(1858, 11, 17, tzinfo=UTC)
@@ -121,7 +121,7 @@ def pose_passages(series: "PoseSeries") -> list[Passage]:
     return passages + [Passage("Unobserved", f"{text}.") for text in unseen]
 
 
-def surface_passages(series: "SurfaceSeries") -> list[Passage]:
+def surface_passages(series: "SurfaceNights") -> list[Passage]:
     """Focal length, rms, the strongest terms, circumstances, nights left out."""
     focal, rms = series.column("focal_length"), series.rms / MICROMETRE
     term = series.column("term") / MICROMETRE
@@ -166,7 +166,7 @@ def nights_passages(found: "NightRows") -> list[Passage]:
 
 
 def sql_passages(rows: "SqlRows") -> list[Passage]:
-    """Size of an answer."""
+    """Rows and columns of an answer."""
     return [Passage("Answer", f"{rows.count} rows of {', '.join(rows.columns)}.")]
 
 

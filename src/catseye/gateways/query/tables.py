@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from catseye.reduction.query.point import PointSeries
     from catseye.reduction.query.pose import PoseSeries
     from catseye.reduction.query.ranger import RangerSeries
-    from catseye.reduction.query.surface import SurfaceSeries
+    from catseye.reduction.query.surface import SurfaceNights
 
 MICROMETRE = 1e-6  # m
 PAGE = "query.md"
@@ -80,6 +80,7 @@ ZEROS: "Table[RangerSeries]" = Table(
         Column(
             "parameter", "", "`zero` (m), or another parameter of the ranger in its own unit", lambda s: s.parameter
         ),
+        Column("head", "", "head and mirror that the ranger had, `ZP101`", lambda s: s.head),
         _night(),
         _mjd(),
         Column("value", "", "estimate of the night, calibration included", lambda s: s.value),
@@ -125,7 +126,7 @@ POSE: "Table[PoseSeries]" = Table(
         Column("unobserved", "", "directions that the night does not show", lambda s: s.unobserved),
     ),
 )
-SURFACE: "Table[SurfaceSeries]" = Table(
+SURFACE: "Table[SurfaceNights]" = Table(
     "surface.csv",
     PAGE,
     (
@@ -166,12 +167,12 @@ SURFACE: "Table[SurfaceSeries]" = Table(
 )
 
 
-def _for_terms(of: Callable[["SurfaceSeries"], np.ndarray], source: "SurfaceSeries") -> np.ndarray:
+def _for_terms(of: Callable[["SurfaceNights"], np.ndarray], source: "SurfaceNights") -> np.ndarray:
     """Value of each night for each of its terms."""
     return np.repeat(of(source), len(source.terms))
 
 
-TERMS: "Table[SurfaceSeries]" = Table(
+TERMS: "Table[SurfaceNights]" = Table(
     "terms.csv",
     PAGE,
     (
@@ -202,7 +203,7 @@ TERMS: "Table[SurfaceSeries]" = Table(
         ),
     ),
 )
-PRISMS: "Table[SurfaceSeries]" = Table(
+PRISMS: "Table[SurfaceNights]" = Table(
     "prisms.csv",
     PAGE,
     (

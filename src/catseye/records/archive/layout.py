@@ -136,6 +136,7 @@ ZEROS = TableLayout(
         Field("parameter", "text", "", "`zero`, or another estimated parameter of a ranger"),
         Field("value", "float", "", "estimate: m for `zero`, else the parameter's own unit"),
         Field("u", "float", "", "standard uncertainty of the estimate"),
+        Field("u_adjusted", "float", "", "the same without errors common to all heads; NaN where it is not known"),
         Field("prior", "float", "", "value of the calibration"),
         Field("u_prior", "float", "", "standard uncertainty of the calibration"),
         TEMPERATURE,

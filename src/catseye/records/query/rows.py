@@ -62,8 +62,8 @@ def _fetched(archive: ArchiveFolder, text: str, values: list[Any]) -> dict[str, 
 
 
 def first_line(problem: Exception) -> str:
-    """First line of another program's message, without its sort."""
-    return " ".join(str(problem).split("\n\n")[0].split())
+    """First line of a message of DuckDB, which quotes the statement after it."""
+    return str(problem).splitlines()[0]
 
 
 def _plain(layout: TableLayout, name: str, values: Any) -> np.ndarray:

@@ -56,7 +56,7 @@ class SqlRows:
 
     @property
     def count(self) -> int:
-        """Number of rows."""
+        """Number of rows, 0 or more."""
         return len(next(iter(self.columns.values()), ()))
 
 

@@ -54,6 +54,8 @@ class AdjustedCoordinates:
     ranges       every shot with a phase
     zeros        ranger: correction to its range, m, and standard uncertainty
     heads        correction of each effect of a head to its sheet, m or rad, and its u: "cyclic ZY101 sine 1"
+    u_adjusted   of zeros and heads, by name ("zero ZY101"): u by the adjustment alone, without the errors common to all
+                 heads that it considers; with the sheet's u it says what the ranges themselves know
     leakage      ranger: residual leakage, V (real, imaginary)
     air          name: estimate and standard uncertainty of thermometer offsets (°C) and profile
     sound        line: its bias, °C (positive: too warm), and u; for lines of path_temperatures.csv
@@ -89,6 +91,7 @@ class AdjustedCoordinates:
     strength: ProcessStrength = field(default_factory=ProcessStrength)
     doubts: tuple[str, ...] = ()
     refuted: tuple[Parameter, ...] = ()
+    u_adjusted: dict[str, float] = field(default_factory=dict)
 
     def index(self, name: str) -> int:
         """Row of a point by its name."""
@@ -179,6 +182,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     """
     network, solution, shots = settled
     ranges = ranges_of(network, solution, shots)
+    adjusted = solution.q.diagonal()
     solution = considered(network, solution, shots)
     solution = network.allowance.considered(network.field, solution, network.layout.air)
     layout, campaign = network.layout, network.campaign
@@ -201,6 +205,13 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     sound = {line.name: air_estimates[line.name] for line in network.field.lines}
     air = {n: value for n, value in air_estimates.items() if n not in sound}
     wrong, refuted = wrong_records(network, solution, air), refuted_priors(settled)
+    heads = {
+        str(layout.parameters[column]): column
+        for n in network.rangers
+        for unknown in head_unknowns(campaign, n)
+        for column in layout.columns(unknown.quantity, len(unknown.parts)).tolist()
+    }
+    zeros = {n: layout.at[Parameter(ParameterKind.ZERO, n)] for n in network.rangers}
     leakage_at = {n: layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]
     return AdjustedCoordinates(
@@ -211,13 +222,12 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         start=np.array(layout.start)[columns],
         shots=np.array([count[n] for n in names]),
         ranges=ranges,
-        heads={
-            str(layout.parameters[column]): estimate(column)
-            for n in network.rangers
-            for unknown in head_unknowns(campaign, n)
-            for column in layout.columns(unknown.quantity, len(unknown.parts))
+        heads={name: estimate(column) for name, column in heads.items()},
+        zeros={n: estimate(column) for n, column in zeros.items()},
+        u_adjusted={
+            **{str(Parameter(ParameterKind.ZERO, n)): float(np.sqrt(adjusted[column])) for n, column in zeros.items()},
+            **{name: float(np.sqrt(adjusted[column])) for name, column in heads.items()},
         },
-        zeros={n: estimate(layout.at[Parameter(ParameterKind.ZERO, n)]) for n in network.rangers},
         leakage={n: (float(solution.x[c[0]]), float(solution.x[c[1]])) for n, c in leakage_at.items()},
         air=air,
         refractivity_ppm=float(used_paths.mean() / PPM) if len(used_paths) else float("nan"),

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,11 +11,12 @@ from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
 from catseye.records.archive.layout import AXES, PRODUCTS
 from catseye.records.archive.reading import ArchiveFolder
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import Campaign, ObservedSite
 from catseye.records.query.rows import select_rows
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of, settled_network
 from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
+from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.settling import SettledNetwork
 from catseye.reduction.query.renewed import calibrated_anew, changed_records, with_records
@@ -185,8 +185,15 @@ def _reduced(
     """Reduction, and the network behind it."""
     networks: list[SettledNetwork] = []
 
-    def adjusted(*arguments: Any, **options: Any) -> AdjustedCoordinates:
-        settled, resolved = settled_network(*arguments, **options)
+    def adjusted(
+        site: ObservedSite,
+        phases: Phases,
+        electronics: dict[str, ElectronicsPhase],
+        *,
+        settings: ReductionSettings,
+        progress: Progress | None = None,
+    ) -> AdjustedCoordinates:
+        settled, resolved = settled_network(site, phases, electronics, settings=settings, progress=progress)
         networks.append(settled)
         return coordinates_of(settled, resolved=resolved)
 

@@ -10,8 +10,8 @@ from catseye.reduction.query.span import ArchiveSpan, several
 from catseye.verdict import Verdict
 
 
-class Validity(Enum):
-    """Validity of a certificate on the night; the value is the word of tables."""
+class CertificateState(Enum):
+    """CertificateState of a certificate on the night; the value is the word of tables."""
 
     VALID = "valid"
     EXPIRED = "expired"
@@ -44,7 +44,7 @@ class NightCertificates:
     value: np.ndarray
     u: np.ndarray
     unit: np.ndarray
-    validity: tuple[Validity, ...]
+    validity: tuple[CertificateState, ...]
 
     @property
     def left(self) -> np.ndarray:
@@ -75,20 +75,20 @@ def night_certificates(span: ArchiveSpan, night: str) -> NightCertificates:
     )
 
 
-def _validity(mjd: float, start: float, end: float) -> Validity:
-    """Validity at a time; the last day itself is valid, and nan states nothing."""
+def _validity(mjd: float, start: float, end: float) -> CertificateState:
+    """CertificateState at a time; the last day itself is valid, and nan states nothing."""
     if np.floor(start) > np.floor(mjd):  # a date has no hour; False for nan
-        return Validity.LATER
+        return CertificateState.LATER
     if np.isnan(end):
-        return Validity.UNLIMITED
-    return Validity.VALID if mjd < np.floor(end) + 1.0 else Validity.EXPIRED
+        return CertificateState.UNLIMITED
+    return CertificateState.VALID if mjd < np.floor(end) + 1.0 else CertificateState.EXPIRED
 
 
-def _judged(instruments: list[str], validity: tuple[Validity, ...]) -> Verdict:
+def _judged(instruments: list[str], validity: tuple[CertificateState, ...]) -> Verdict:
     bad = [
         (name, each)
         for name, each in zip(instruments, validity, strict=True)
-        if each in (Validity.EXPIRED, Validity.LATER)
+        if each in (CertificateState.EXPIRED, CertificateState.LATER)
     ]
     if not bad:
         return Verdict("good", f"{several(len(instruments), 'certificate')}, all of them valid on the night")

@@ -26,7 +26,7 @@ class NightRows:
 
     @property
     def count(self) -> int:
-        """Number of nights."""
+        """Number of nights, 0 or more."""
         return len(self.rows["night"])
 
 

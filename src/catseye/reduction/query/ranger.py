@@ -50,8 +50,11 @@ class RangerSeries:
     """Parameters of a ranger, a row a night and parameter, n rows.
 
     parameter         (n,) "zero" (m), and others in their own units
+    head              (n,) mirror and head that the ranger had; "" where the archive does not say
     night, mjd        (n,)
-    value, u          (n,) estimate of the night, its calibration included
+    value, u          (n,) estimate of the night, its calibration included; zeros count from the D0 of the last night's
+                      sheet, so that a new sheet is a step of the prior and none of the head
+    u_adjusted        (n,) u without the errors common to all heads; nan where it is not known
     prior, u_prior    (n,) calibration
     temperature_c     (n,) of the air
     """
@@ -59,10 +62,12 @@ class RangerSeries:
     ranger: str
     verdict: Verdict
     parameter: np.ndarray
+    head: np.ndarray
     night: np.ndarray
     mjd: np.ndarray
     value: np.ndarray
     u: np.ndarray
+    u_adjusted: np.ndarray
     prior: np.ndarray
     u_prior: np.ndarray
     temperature_c: np.ndarray
@@ -70,11 +75,12 @@ class RangerSeries:
     @cached_property
     def own(self) -> tuple[np.ndarray, np.ndarray]:
         """Value and standard uncertainty (n,) by the night's observations alone; nan where they say nothing."""
-        return without_prior(self.value, self.u, self.prior, self.u_prior)
+        u = np.where(np.isfinite(self.u_adjusted), self.u_adjusted, self.u)
+        return without_prior(self.value, u, self.prior, self.u_prior)
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names, the zero first."""
+        """Names of the parameters, the zero first."""
         return tuple(sorted(set(self.parameter.tolist()), key=lambda name: (name != ZERO, name)))
 
     @cached_property
@@ -87,7 +93,9 @@ class RangerSeries:
         return np.flatnonzero(self.parameter == parameter)
 
     def _drift(self, parameter: str) -> Drift:
+        """Drift by the nights with the head of the last one: another head is another instrument."""
         rows = self.rows_of(parameter)
+        rows = rows[self.head[rows] == self.head[rows[-1]]]
         values, u = self.own[0][rows], self.own[1][rows]
         known = np.isfinite(values)
         if not known.any():
@@ -102,10 +110,31 @@ def ranger_series(span: ArchiveSpan, ranger: str) -> RangerSeries:
 
     Raises InputError: an unknown ranger, a span without a night.
     """
-    columns = ("parameter", "night", "mjd", "value", "u", "prior", "u_prior", "temperature_c")
+    columns = ("parameter", "night", "mjd", "value", "u", "u_adjusted", "prior", "u_prior", "temperature_c")
     rows = span.table("zeros", *columns, ranger=ranger)
     if not len(rows["night"]):
         span.refuse_empty("zeros", "ranger", ranger)
+    heads, d0 = _sheets(span, ranger, rows["night"])
+    for name in ("value", "prior"):
+        rows[name] = np.where(rows["parameter"] == ZERO, rows[name] + d0, rows[name])
     nights = set(rows["night"].tolist())
     good = f"{several(len(nights), 'night')}, all of them good"
-    return RangerSeries(ranger=ranger, verdict=span.verdict(nights, good), **rows)
+    return RangerSeries(ranger=ranger, verdict=span.verdict(nights, good), head=heads, **rows)
+
+
+def _sheets(span: ArchiveSpan, ranger: str, nights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Head of each row's night, and its D0 less that of the last night, m; 0 where no sheet states one."""
+    sheets = span.table("certificates", "night", "mjd", "instrument", "value", ranger=ranger, kind="mirror")
+    if not len(sheets["night"]):
+        return np.full(len(nights), ""), np.zeros(len(nights))
+    last = int(np.argmax(sheets["mjd"]))
+    of = dict(
+        zip(
+            sheets["night"].tolist(),
+            zip(sheets["instrument"].tolist(), sheets["value"].tolist(), strict=True),
+            strict=True,
+        )
+    )
+    named = [of.get(night, ("", float("nan"))) for night in nights.tolist()]
+    steps = np.array([d0 for _, d0 in named]) - sheets["value"][last]
+    return np.array([head for head, _ in named]), steps if np.isfinite(sheets["value"]).all() else np.zeros(len(nights))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from catseye.errors import InputError
 from catseye.records.night.campaign import Campaign
@@ -32,7 +32,7 @@ HEAD_KEYS = {  # name of a prior -> keys of a mirror's sheet that it comes from
 
 
 class _Line(NamedTuple):
-    """Ends of a shot."""
+    """Ranger and target of a shot."""
 
     ranger: str
     target: str
@@ -108,23 +108,25 @@ def calibrated_anew(old: SiteFolder, new: SiteFolder) -> dict[str, set[str]]:
     }
 
 
-def _parts(heads: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, tuple[Any, ...]]:
+def _parts(heads: Mapping[str, object], keys: tuple[str, ...]) -> dict[str, tuple[object, ...]]:
     """Values of some keys of each head's sheet."""
     return {name: tuple(getattr(head, key) for key in keys) for name, head in heads.items()}
 
 
-def _heads(site: SiteFolder) -> dict[str, Any]:
+def _heads(site: SiteFolder) -> dict[str, object]:
+    """Mirror's sheet of each ranger."""
     return {ranger: site.mirrors[zp] for ranger, (zp, _) in mounts(site.monuments, site.feedarm).items()}
 
 
-def _by_target(site: SiteFolder) -> dict[str, Any]:
+def _by_target(site: SiteFolder) -> dict[str, object]:
+    """Benchmark of each target."""
     return {row.target: row for row in site.benchmarks}
 
 
-def _stations(site: SiteFolder) -> dict[str, Any]:
+def _stations(site: SiteFolder) -> dict[str, object]:
     return {station.name: station for station in site.site.weather_station}
 
 
-def _differing(old: Mapping[str, Any], new: Mapping[str, Any]) -> set[str]:
+def _differing(old: Mapping[str, object], new: Mapping[str, object]) -> set[str]:
     """Names whose records differ or are in one only."""
     return {name for name in {*old, *new} if old.get(name) != new.get(name)}

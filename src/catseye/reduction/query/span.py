@@ -23,7 +23,7 @@ class ArchiveSpan:
     since: float | None = None
     until: float | None = None
 
-    def table(self, kind: str, *columns: str, **where: str) -> dict[str, np.ndarray]:
+    def table(self, kind: str, /, *columns: str, **where: str) -> dict[str, np.ndarray]:
         """Columns of a table within the span, of the few rows whose columns equal `where`."""
         return select_rows(self.archive, kind, columns, where, since=self.since, until=self.until)
 

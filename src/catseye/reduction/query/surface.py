@@ -49,7 +49,7 @@ class NightSurface:
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceSeries:
+class SurfaceNights:
     """Surfaces of n nights, of k prisms altogether.
 
     night, mjd               (n,)
@@ -108,7 +108,7 @@ class _Prisms:
     covariance: np.ndarray
 
 
-def surface_series(span: ArchiveSpan, aperture: LitAperture, progress: Progress | None = None) -> SurfaceSeries:
+def surface_series(span: ArchiveSpan, aperture: LitAperture, progress: Progress | None = None) -> SurfaceNights:
     """Surfaces of the nights of a span that have a pose of the dish and enough prisms.
 
     Prisms count as independent of each other: what a night's air or zeros move alike on the whole dish is not in the
@@ -154,7 +154,7 @@ def surface_series(span: ArchiveSpan, aperture: LitAperture, progress: Progress 
     nights = rows["night"][kept]
     with np.errstate(invalid="ignore"):
         places = sums / seen[:, None]
-    return SurfaceSeries(
+    return SurfaceNights(
         verdict=span.verdict(nights.tolist(), f"{several(len(nights), 'night')}, all of them good"),
         night=nights,
         mjd=rows["mjd"][kept],
