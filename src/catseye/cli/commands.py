@@ -9,9 +9,9 @@ import typer
 from typer.core import TyperGroup
 
 from catseye.cli.inputs import prepare
+from catseye.cli.many_options import NOTHING_SAID, Several, progress_of_many, refuse_several, tell_many
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
-from catseye.cli.scale.options import NOTHING_SAID, Several, progress_of_many, refuse_several, tell_many
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.cli.vocabularies import AIR_MODEL, AIR_MODELS, one_of
 from catseye.version import __version__
@@ -24,6 +24,7 @@ ROOMS = (
     *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
+    *("scale.archive", "scale.query"),
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples"),
@@ -34,6 +35,7 @@ SUBJECTS = {  # as `catseye --help` groups the commands
     "Air": ("air", "sound", "refractometer", "acoustic"),
     "Light": ("point", "link", "beam", "glass", "safety"),
     "A living site": ("simulate", "serve", "view", "zy", "ziy", "replay", "export", "journal"),
+    "Years of nights": ("archive", "restore", "query"),
     "Figures": ("plot",),
 }
 

@@ -10,7 +10,7 @@ import typer
 from catseye.cli.commands import Json, Quiet, Threads, app
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
-from catseye.cli.scale.options import Several, progress_of_many
+from catseye.cli.many_options import Several, progress_of_many
 from catseye.cli.terminal import ProgressLine, say
 from catseye.cli.vocabularies import COMPONENTS, DATUMS, NETWORK_WEIGHTS, one_of
 

@@ -1,6 +1,7 @@
 """Many units: each has its outcome, in order, whatever becomes of the processes."""
 
 import json
+import multiprocessing
 import threading
 
 import pytest
@@ -21,6 +22,7 @@ from service.many.many_scene import (
     span,
     square,
     units,
+    unsendable,
 )
 
 
@@ -67,6 +69,13 @@ def test_a_unit_that_always_kills_its_process_fails_and_the_others_do_not():
     found = run_many([*units(killed, 1), *units(square, 3)], processes=2)
     assert states(found) == ["failed", "done", "done", "done"]
     assert found[0].why == "its process was killed by SIGKILL 4 times, most likely out of memory"
+
+
+def test_what_cannot_be_sent_to_a_process_fails_by_itself():
+    found = run_many([Unit("local", lambda: {"x": 1}), Unit("answer", unsendable), *units(square, 1)], processes=1)
+    assert states(found) == ["failed", "failed", "done"]
+    assert "pickle" in found[0].why
+    assert "pickle" in found[1].why
 
 
 def test_units_share_the_memory_and_too_large_a_one_runs_by_itself():
@@ -166,3 +175,16 @@ def test_the_ledger_holds_one_whole_file_a_unit(tmp_path):
     names = sorted(path.name for path in (tmp_path / "ledger").iterdir())
     assert names == ["ledger.json", "square-0.json", "square-1.json"]
     assert json.loads((tmp_path / "ledger" / "square-1.json").read_text())["entry"]["value"]["square"] == 1
+
+
+def test_an_interrupted_call_ends_its_processes_and_notes_what_is_done(tmp_path):
+    def interrupt(task, done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as told:
+        run_many(units(square, 4), processes=1, ledger=tmp_path / "ledger", progress=interrupt)
+    assert told.value.__notes__ == ["2 of 4 are done; resume continues from there"]
+    assert not [child for child in multiprocessing.active_children() if child.is_alive()]
+    states_then = states(run_many(units(square, 4), processes=1, ledger=tmp_path / "ledger", resume=True))
+    assert states_then == ["resumed", "resumed", "done", "done"]
