@@ -95,7 +95,7 @@ def ring(targets: int, stations: int = 12) -> NetworkSolution:
     rng = np.random.default_rng(targets)
     turn = 2.0 * np.pi * np.arange(stations) / stations
     ground = np.stack([100.0 * np.cos(turn), 100.0 * np.sin(turn), 30.0 * rng.uniform(-1, 1, stations)], axis=1)
-    xyz = np.concatenate([ground, rng.uniform(-50, 50, (targets, 3)) + (0.0, 0.0, 50.0)])
+    xyz = np.concatenate([ground, rng.uniform(-50, 50, (targets, 3)) + np.array([0.0, 0.0, 50.0])])
     pairs = np.stack(np.meshgrid(np.arange(stations), stations + np.arange(targets), indexing="ij"), -1).reshape(-1, 2)
     m = len(pairs)
     ranges = Distances("ranges", np.zeros(m), np.full(m, 2.5e-9), 3 * pairs[:, 0], 3 * pairs[:, 1])

@@ -285,8 +285,8 @@ class NetworkSimulation:
         departure[:, self._angles] -= TWO_PI * np.round(departure[:, self._angles] / TWO_PI)
         claims, z = claims[usable], departure @ self.combinations.T
         for place, r in enumerate(np.flatnonzero(usable)):
-            if r in own:
-                z[place] = own[r] @ z[place]
+            if int(r) in own:
+                z[place] = own[int(r)] @ z[place]
         placed = (self.moving < self.network.points.xyz.size) & (claims > 0.0)
         of_claim = np.where(placed, departure**2 / np.where(claims > 0.0, claims, 1.0), 0.0)
         ratios = of_claim.sum(axis=1) / np.maximum(placed.sum(axis=1), 1)

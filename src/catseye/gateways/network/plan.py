@@ -156,7 +156,7 @@ def scatter_words(s: MonteCarloScatter) -> str:
     text += "." if s.ratio < 1.2 else ": the errors added to the claimed noise show."
     if np.isfinite(s.found):
         text += f" {100 * s.found:.1f} % of the gross errors were left out, and {100 * s.false:.2f} % of the good ones."
-    test, claim = s.covariance, "the predicted one" if s.normal else "what each run claims without its rejections"
+    test, claim = s.covariance, "the predicted one" if s.normal else "the one that each run claims"
     text += (
         f" As matrices, over {test.combinations} independent combinations of the coordinates: their covariance "
         f"{'agrees with' if test.agrees else 'contradicts'} {claim} (p {_probability(test.p)} for its shape "
