@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from catseye.cli.commands import Json, Quiet, Threads, app
+from catseye.cli.many_options import Several, progress_of_many
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
-from catseye.cli.many_options import Several, progress_of_many
 from catseye.cli.terminal import ProgressLine, say
 from catseye.cli.vocabularies import COMPONENTS, DATUMS, NETWORK_WEIGHTS, one_of
 

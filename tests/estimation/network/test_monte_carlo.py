@@ -187,6 +187,19 @@ def test_rejected_blunders_are_counted(ranging_network):
     assert result.false == 10 / np.sum(~wrong)
 
 
+def test_runs_that_leave_observations_out_are_held_to_their_own_claim(ranging_network):
+    """Half of the ranges of three stations left out: the planned covariance is too small, each run's is right."""
+    network, _ = ranging_network(13, stations=8)
+    made = simulation(network, blunders=1e-9)
+    active = ~((network.groups[0].origin < 9) & (network.groups[0].target % 2 == 0))
+    quick = NetworkSettings(diagnose=False)
+    sums = made.run(0, 300, lambda drawn: adjust_network(drawn, active=[active], settings=quick))
+    assert scatter_of(made, sums).covariance.agrees
+    planned = replace(made, disturbance=Disturbance())
+    sums = planned.run(0, 300, lambda drawn: adjust_network(drawn, active=[active], settings=quick))
+    assert scatter_of(planned, sums).covariance.p < 1e-6
+
+
 def test_runs_without_an_answer_do_not_count_and_none_is_an_error(ranging_network):
     network, _ = ranging_network(11)
     made = replace(simulation(network), in_batches=False)

@@ -96,6 +96,9 @@ def test_a_scatter_that_is_wrong_along_one_combination_alone_is_doubtful(network
         "along one combination of the coordinates are 3.00 times the claim (by chance up to 1.45)" in wrong.verdict.why
     )
 
+    with_blunders = replace(wrong, scatter=replace(wrong.scatter, found=0.9))
+    assert with_blunders.verdict.word == "good"
+
 
 @pytest.mark.parametrize("name", ["runs", "seed"])
 def test_negative_numbers_are_refused(name):

@@ -68,7 +68,8 @@ class MonteCarloScatter:
     ratio         root mean square of departure over claim, all free coordinates: 1 when the claim holds
     found         share of the blunders that were rejected, nan without any
     false         share of the good observations that were rejected
-    covariance    departures of the coordinates against their planned covariance, as matrices
+    covariance    departures of the coordinates against their planned covariance, as matrices; where blunders are
+                  rejected, against the claimed one of each run
     """
 
     runs: int
@@ -79,6 +80,11 @@ class MonteCarloScatter:
     found: float
     false: float
     covariance: CovarianceTest
+
+    @property
+    def normal(self) -> bool:
+        """True if the errors are normally distributed, without blunders: what the limits of the test are for."""
+        return not np.isfinite(self.found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +132,7 @@ class RunSums:
         return RunSums(**summed, status=other.status or self.status)
 
     def to_object(self) -> dict[str, Any]:
-        """Object for JSON, exact."""
+        """Object for JSON, exact to the last bit."""
         lower = self.moments[np.tril_indices(len(self.moments))]
         arrays = {"squares": self.squares.tolist(), "claims": self.claims.tolist(), "moments": lower.tolist()}
         return {**vars(self), **arrays}
@@ -258,6 +264,7 @@ class NetworkSimulation:
         """Sums over drawn runs, solved here."""
         count, status = len(runs.truth), ""
         x, claims = np.full((2, count, len(self.moving)), np.nan)
+        own: dict[int, np.ndarray] = {}  # combinations of the runs whose claim is not the planned one
         usable, tally = np.zeros(count, dtype=bool), np.zeros(4, dtype=int)
         if self.in_batches:
             solved = self.batches.solve(runs.observed)
@@ -272,9 +279,14 @@ class NetworkSimulation:
                 continue
             x[r], claims[r], usable[r] = solution.state[self.moving], solution.q.diagonal()[self.moving], True
             tally += _rejections(solution, [wrong[r] for wrong in runs.wrong])
+            if self.disturbance.blunders > 0.0:
+                own[int(r)] = self._own(solution)
         departure = x[usable] - runs.truth[usable][:, self.moving]
         departure[:, self._angles] -= TWO_PI * np.round(departure[:, self._angles] / TWO_PI)
         claims, z = claims[usable], departure @ self.combinations.T
+        for place, r in enumerate(np.flatnonzero(usable)):
+            if int(r) in own:
+                z[place] = own[int(r)] @ z[place]
         placed = (self.moving < self.network.points.xyz.size) & (claims > 0.0)
         of_claim = np.where(placed, departure**2 / np.where(claims > 0.0, claims, 1.0), 0.0)
         ratios = of_claim.sum(axis=1) / np.maximum(placed.sum(axis=1), 1)
@@ -291,6 +303,13 @@ class NetworkSimulation:
             good=int(tally[3]),
             status=status,
         )
+
+    def _own(self, solution: NetworkSolution) -> np.ndarray:
+        """Matrix (k, k) that makes the combinations independent by a solution's own claim."""
+        tested = np.flatnonzero(self.combinations.any(axis=0))
+        root = self.combinations[:, tested]
+        values, vectors = np.linalg.eigh(root @ solution.q.within(self.moving[tested]) @ root.T)
+        return np.asarray((vectors / np.sqrt(values)) @ vectors.T)
 
 
 def _drawn(network: ObservationNetwork, generator: np.random.Generator, disturbance: Disturbance) -> list[np.ndarray]:

@@ -156,10 +156,10 @@ def scatter_words(s: MonteCarloScatter) -> str:
     text += "." if s.ratio < 1.2 else ": the errors added to the claimed noise show."
     if np.isfinite(s.found):
         text += f" {100 * s.found:.1f} % of the gross errors were left out, and {100 * s.false:.2f} % of the good ones."
-    test = s.covariance
+    test, claim = s.covariance, "the predicted one" if s.normal else "the one that each run claims"
     text += (
         f" As matrices, over {test.combinations} independent combinations of the coordinates: their covariance "
-        f"{'agrees with' if test.agrees else 'contradicts'} the predicted one (p {_probability(test.p)} for its shape "
+        f"{'agrees with' if test.agrees else 'contradicts'} {claim} (p {_probability(test.p)} for its shape "
         f"and p {_probability(test.p_size)} for its size); along the worst combination they are {test.largest:.2f} of "
         f"the claim, where chance alone gives up to {test.by_chance:.2f}."
     )

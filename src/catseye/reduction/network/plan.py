@@ -154,7 +154,7 @@ def _verdict(planned: PlannedNetwork) -> Verdict:
     if planned.scatter is not None and planned.scatter.ratio > LARGEST_RATIO:
         ratio = planned.scatter.ratio
         return Verdict("doubtful", f"in the Monte Carlo the departures are {ratio:.2f} times the claimed uncertainties")
-    if planned.scatter is not None and planned.scatter.covariance.excess > LARGEST_RATIO:
+    if planned.scatter is not None and planned.scatter.normal and planned.scatter.covariance.excess > LARGEST_RATIO:
         test = planned.scatter.covariance
         return Verdict(
             "doubtful",
