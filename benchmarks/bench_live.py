@@ -54,9 +54,9 @@ from load_scene import LoadChild, load_site, lost_and_doubled
 TICK = 864e-6  # s
 LONGEST_START, SETTLED, DRAINED, LONGEST_END = 60.0, 14.0, 2.0, 30.0  # s
 RANGERS = 18
-SECONDS, QUICK_SECONDS, PEER_SECONDS, PEER_SETTLED = 20.0, 10.0, 8.0, 3.0
+SECONDS, QUICK_SECONDS, PEER_SECONDS, PEER_SETTLED = 15.0, 10.0, 6.0, 2.0
 SEGMENTS = 5  # of a measurement, for its spread
-DARK_TRIES = 90
+DARK_TRIES = 54
 BUFFER_BYTES = 16_384
 
 

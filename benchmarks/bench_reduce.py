@@ -36,7 +36,7 @@ from catseye.signal.detection.phase import detect
 from harness import LIMIT, Contender, Curve, Row, main, raced, spread
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "night-01"
-SIZES = (60, 120, 250, 500, 1000, 2209)
+SIZES = (60, 250, 500, 1000, 2209)
 SPARSE_AT = 500  # prisms at which a general sparse solver is tried beside; at 2209 it takes minutes
 
 
@@ -161,8 +161,8 @@ def rows(quick: bool) -> Iterator[Row]:
         beside={},
         limit_s=dish["read"],
         spread=0.0,
-        note=f"processor time of one run; {dish['gb']:.2f} GB at most; adjustment and rejection {dish['settle']:.1f} s; the "
-        "limit is one read of the samples",
+        note=f"processor time of one run; {dish['gb']:.2f} GB at most; adjustment and rejection {dish['settle']:.1f} s;"
+        " the limit is one read of the samples",
     )
 
 

@@ -28,7 +28,7 @@ from harness import Row, main
 from web.busy_scene import LOOK, busy_site, cpu_of, growth_of, listening_to, memory_of, memory_over, page_of
 
 SETTLED = 3.0  # s after clients came
-SECONDS, CLIENTS, RANGERS = 8.0, 50, 18
+SECONDS, CLIENTS, RANGERS = 6.0, 50, 18
 CROWD = f"{CLIENTS} clients, 1 stuck"
 ASSET = re.compile(r'(?:src|href)="(/[^"]+)"')
 API = ("/api/service", "/api/site", "/api/state", "/api/epochs?limit=1")

@@ -202,7 +202,7 @@ def main(
     parser.add_argument("--curves", action="store_true", help="scaling curves too")
     parser.add_argument("--lines", type=Path, metavar="FILE", help="results as JSON lines, too")
     for flag, text in (flags or {}).items():
-        parser.add_argument(flag, action="store_true", help=text)
+        parser.add_argument(f"--{flag.lstrip('-')}", action="store_true", help=text)
     options = parser.parse_args()
     produced = [("row", rows)] + ([("curve", curves)] if curves and options.curves else [])
     for kind, generator in produced:
@@ -234,7 +234,7 @@ def in_words(result: Row | Curve) -> str:
         return f"{result.path}, {result.what}: {result.variable}^{slope:.2f} (u {u:.2f}); {pairs}"
     lines = [f"{result.path}: {result.what}: {duration(result.ours_s)}, spread {100 * result.spread:.0f} %"]
     for name, ratio in result.ratios().items():
-        said = f"{ratio:.2f} of it" if name == LIMIT else f"{ratio:.3g} x"
+        said = f"{ratio:.2g} of it" if name == LIMIT else f"{ratio:.3g} x"
         lines.append(f"    {name:<60} {said}")
     lines += [f"    {name:<60} skipped: {why}" for name, why in result.skipped.items()]
     return "\n".join([*lines, *([f"    {result.note}"] if result.note else [])])

@@ -10,6 +10,7 @@ line; then the others' rows are shown, nothing is written, and the status is 1.
 
 import argparse
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -30,12 +31,13 @@ ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THRE
 
 @dataclass(frozen=True)
 class Findings:
-    """Rows and curves of a script; `why` is empty, or why it failed."""
+    """Rows and curves of a script, its wall and processor time in s; `why` is empty, or why it failed."""
 
     script: str
     rows: tuple[Row, ...]
     curves: tuple[Curve, ...]
     seconds: float
+    processor: float
     why: str = ""
 
 
@@ -49,7 +51,7 @@ def scripts(only: Sequence[str] = ()) -> list[Path]:
 
 def run(script: Path, *, quick: bool, longest: float = LONGEST_S) -> Findings:
     """Findings of one script, in a process of its own; its curves too, unless quick."""
-    begun = time.perf_counter()
+    begun, before = time.perf_counter(), children_processor()
     with tempfile.TemporaryDirectory() as folder:
         lines = Path(folder) / "lines"
         command = [sys.executable, str(script), "--lines", str(lines), "--quick" if quick else "--curves"]
@@ -63,7 +65,20 @@ def run(script: Path, *, quick: bool, longest: float = LONGEST_S) -> Findings:
             told = (done.stderr or done.stdout).strip().splitlines()
             why = f"status {done.returncode}: {told[-1] if told else 'no output'}" if done.returncode else ""
         rows, curves = read_lines(lines)
-    return Findings(script.name, tuple(rows), tuple(curves), time.perf_counter() - begun, why)
+    return Findings(
+        script=script.name,
+        rows=tuple(rows),
+        curves=tuple(curves),
+        seconds=time.perf_counter() - begun,
+        processor=children_processor() - before,
+        why=why,
+    )
+
+
+def children_processor() -> float:
+    """Processor s of the processes that this one started and that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def say(line: str) -> None:
@@ -79,11 +94,9 @@ def run_all(paths: Sequence[Path], *, quick: bool) -> list[Findings]:
         found.append(run(path, quick=quick))
         for result in (*found[-1].rows, *found[-1].curves):
             say(in_words(result))
-        say(
-            f"-- {path.name}: {found[-1].seconds:.0f} s"
-            + (f", FAILED: {found[-1].why}" if found[-1].why else "")
-            + "\n"
-        )
+        one = found[-1]
+        why = f", FAILED: {one.why}" if one.why else ""
+        say(f"-- {one.script}: {one.seconds:.0f} s, {one.processor:.0f} s of processors{why}\n")
     return found
 
 

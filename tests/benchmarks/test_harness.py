@@ -108,7 +108,7 @@ def test_lines_of_a_script_come_back(tmp_path, monkeypatch, capsys):
     assert read_lines(tmp_path / "lines") == ([row(note="quick True")], [curve])
     said = capsys.readouterr().out
     assert "2.5 x" in said
-    assert "0.50 of it" in said
+    assert "0.5 of it" in said
     assert "0.5 GB" in said
     assert read_lines(tmp_path / "none") == ([], [])
 
