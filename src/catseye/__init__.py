@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.scale.many import reduce_nights
+    from catseye.api.scale.many_runs import replay_journals, simulate_runs
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
@@ -75,6 +76,7 @@ FACE = {  # file of catseye.api -> its exported names
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "scale.many": ("reduce_nights",),
+    "scale.many_runs": ("replay_journals", "simulate_runs"),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
@@ -126,12 +128,14 @@ __all__ = [
     "reduce_nights",
     "refractometer",
     "replay",
+    "replay_journals",
     "report_of",
     "safety",
     "save",
     "save_triplet_form",
     "show",
     "simulate",
+    "simulate_runs",
     "sound",
     "structure",
     "surface",
