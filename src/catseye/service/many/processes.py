@@ -11,7 +11,7 @@ from typing import Any
 
 from catseye.service.many.unit import Death, Unit, UnitReport
 from catseye.service.many.work import perform
-from catseye.service.many.worker import begin, starting
+from catseye.service.many.worker import begin, start_tracker, starting
 
 LEAVE = 2.5  # s that a worker has to leave by itself, before it is killed
 KILLED = 1.0  # s until a killed process is gone
@@ -68,7 +68,7 @@ class _Slot:
 
     @property
     def alive(self) -> list[SpawnProcess]:
-        """ProcessWorkers that were started and have not been seen to end."""
+        """Processes that were started and have not been seen to end."""
         return list(self._context.started)
 
 
@@ -81,6 +81,7 @@ class ProcessWorkers:
 
     def __init__(self, count: int, ledger: Path | None, *, with_main: bool):
         self.count, self._ledger = count, ledger
+        start_tracker()
         context = SpawnContext()
         theirs, self._lifeline = context.Pipe(duplex=False)
         self._slots = [_Slot(theirs, with_main=with_main) for _ in range(count)]

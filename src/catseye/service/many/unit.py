@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+from catseye.errors import InputError
+
 MEMORY = 300 * 2**20  # bytes that a unit may take, unless it says more
 
 
@@ -68,3 +70,7 @@ class Death(NamedTuple):
     """
 
     why: str
+
+
+class LostClusterError(InputError):
+    """Cluster that is gone in the middle of a run."""
