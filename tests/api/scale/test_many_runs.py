@@ -36,7 +36,7 @@ def test_runs_tell_their_scatter(two):
     points = made.scatter[0]
     assert (points.quantity, points.runs) == ("points", 2)
     assert points.terms == sum(o.value["coordinates"] for o in made.outcomes)
-    assert list(made.to_table("scatter")["quantity"])[0] == "points"
+    assert next(iter(made.to_table("scatter")["quantity"])) == "points"
     assert any(passage.title == "Scatter of points" for passage in made.passages())
     assert isinstance(made.to_object(), list)
 
