@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from catseye.api.result import save, show
     from catseye.api.scale.archive import archive, restore
     from catseye.api.scale.many import reduce_nights
+    from catseye.api.scale.many_runs import replay_journals, simulate_runs
     from catseye.api.scale.query import query
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
@@ -78,6 +79,7 @@ FACE = {  # file of catseye.api -> its exported names
     "result": ("save", "show"),
     "scale.archive": ("archive", "restore"),
     "scale.many": ("reduce_nights",),
+    "scale.many_runs": ("replay_journals", "simulate_runs"),
     "scale.query": ("query",),
     "steering": ("point", "track"),
     "structure": ("structure",),
@@ -132,6 +134,7 @@ __all__ = [
     "reduce_nights",
     "refractometer",
     "replay",
+    "replay_journals",
     "report_of",
     "restore",
     "safety",
@@ -139,6 +142,7 @@ __all__ = [
     "save_triplet_form",
     "show",
     "simulate",
+    "simulate_runs",
     "sound",
     "structure",
     "surface",

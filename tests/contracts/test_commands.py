@@ -249,7 +249,11 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 VERBS = ("plot",)  # groups whose name is the verb
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
-OF_SEVERAL = {"reduce": "reduce_nights"}  # command that takes one input or several -> function for several
+OF_SEVERAL = {  # command that takes one input or several -> function for several
+    "reduce": "reduce_nights",
+    "replay": "replay_journals",
+    "simulate": "simulate_runs",
+}
 OTHER_DEFAULTS = {
     "simulate": {"fast", "port_base"}
 }  # a person watches in real time; a call takes virtual time, any port

@@ -2,6 +2,7 @@
 
 A power-up takes a ranger half a minute: thousands of lines, and the search for two indices. A simulation starting
 with it would show little else in its first minute, so the head's clock is advanced as fast as the work is done.
+Rangers of a lane are made ready one after another, as many as the time before the start allows; lanes share its clock.
 """
 
 import asyncio
@@ -27,6 +28,7 @@ from catseye.service.listening import STEP_NAME
 BEFORE = 300.0  # s before the start, when the rangers are powered on
 STEP = 0.05  # s between two polls of a busy ranger
 HOMING_TIMEOUT = 35.0  # s an axis: a ZY gives up after 30
+LANE = 18  # rangers made ready one after another: 10 to 15 s each
 LEAVING = 20.0  # s: a quarter turn of either axis, and the next check of the Sun
 HOMING = (  # amplifiers, then the indices with the laser off, then the laser, to test if it is allowed
     *(
@@ -55,6 +57,11 @@ class WarmingClock:
     def now_ns(self) -> int:
         """Nanoseconds since MJD 0."""
         return self._clock.now_ns() if self._now is None else self._now
+
+    @property
+    def over(self) -> bool:
+        """True once it has reached the other clock: nothing can be waited for."""
+        return self._now is None or self._now >= self._clock.now_ns()
 
     def advance(self, seconds: float) -> None:
         """Advance the time, but never past the other clock."""
@@ -85,24 +92,97 @@ async def warm(
 
     Raises InputError: a command of the records is refused.
     """
-    commands, guard, loader = SiteCommands(site), SafetyGuard(site), _Loader()
-    problems: list[str] = []
-    for done, (name, ranger) in enumerate(rangers.items()):
-        progress(STEP_NAME, done, len(rangers))
-        loader.load(ranger, Preparation.of(commands.of_ranger(name)).requests)
-        _tell_sun(guard, name, ranger, clock, posture)
-        problem = await _homed_and_lit(name, ranger, clock)
-        if problem is not None or not ranger.laser_at_boot:
-            ranger.work_of(CLIENT, Request("PS", ("0",)))  # dark until the holder of the lease switches it on
-        if problem is not None:
-            problems.append(problem)
-        ranger.disconnect(CLIENT)
-        await asyncio.sleep(0.0)
+    work = _WarmUp(site, rangers, clock, posture, progress)
+    names = list(rangers)
+    lanes = [names[k : k + LANE] for k in range(0, len(names), LANE)]
+    work.lanes.running = len(lanes)
+    tasks = [asyncio.ensure_future(work.lane(lane)) for lane in lanes]
+    try:
+        await asyncio.gather(*tasks)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
     progress(STEP_NAME, len(rangers), len(rangers))
     clock.release()
     for name, ranger in rangers.items():
-        _tell_sun(guard, name, ranger, clock, posture)
-    return problems
+        _tell_sun(work.guard, name, ranger, clock, posture)
+    return [work.problems[name] for name in names if name in work.problems]
+
+
+class _Lanes:
+    """Lanes that share a clock, which advances when all of them wait for it.
+
+    running   number of lanes that have not ended
+    """
+
+    def __init__(self, clock: WarmingClock):
+        self._clock = clock
+        self.running = 0
+        self._waiting: list[asyncio.Future[None]] = []
+
+    async def advance(self) -> None:
+        """Wait until the clock has advanced by a step."""
+        waiter = asyncio.get_running_loop().create_future()
+        self._waiting.append(waiter)
+        self._step()
+        if not waiter.done():
+            await waiter
+
+    def end(self) -> None:
+        """End a lane, for which the others no longer wait."""
+        self.running -= 1
+        self._step()
+
+    def _step(self) -> None:
+        if self._waiting and len(self._waiting) == self.running:
+            self._clock.advance(STEP)
+            waiting, self._waiting = self._waiting, []
+            for waiter in waiting:
+                if not waiter.done():
+                    waiter.set_result(None)
+
+
+class _WarmUp:
+    """Warm-up of a site's rangers, in lanes.
+
+    problems   of rangers that stay dark, by name
+    """
+
+    def __init__(
+        self,
+        site: SiteFolder,
+        rangers: Mapping[str, Ranger],
+        clock: WarmingClock,
+        posture: Callable[[int], LivePosture],
+        progress: Progress,
+    ):
+        self._rangers, self._clock, self._posture, self._progress = rangers, clock, posture, progress
+        self._commands, self.guard, self._loader = SiteCommands(site), SafetyGuard(site), _Loader()
+        self.lanes = _Lanes(clock)
+        self._done = 0
+        self.problems: dict[str, str] = {}
+
+    async def lane(self, names: Sequence[str]) -> None:
+        """Make rangers ready one after another."""
+        try:
+            for name in names:
+                await self._one(name, self._rangers[name])
+        finally:
+            self.lanes.end()
+
+    async def _one(self, name: str, ranger: Ranger) -> None:
+        self._progress(STEP_NAME, self._done, len(self._rangers))
+        self._loader.load(ranger, Preparation.of(self._commands.of_ranger(name)).requests)
+        _tell_sun(self.guard, name, ranger, self._clock, self._posture)
+        problem = await _homed_and_lit(name, ranger, self._clock, self.lanes)
+        if problem is not None or not ranger.laser_at_boot:
+            ranger.work_of(CLIENT, Request("PS", ("0",)))  # dark until the holder of the lease switches it on
+        if problem is not None:
+            self.problems[name] = problem
+        ranger.disconnect(CLIENT)
+        self._done += 1
+        await asyncio.sleep(0.0)
 
 
 class _Loader:
@@ -145,12 +225,12 @@ def _tell_sun(
     ranger.work_of(CLIENT, Request("SUN", tuple(f"{v:.7f}" for v in guard.sun_vector(name, ticks))))
 
 
-async def _homed_and_lit(name: str, ranger: Ranger, clock: WarmingClock) -> str | None:
+async def _homed_and_lit(name: str, ranger: Ranger, clock: WarmingClock, lanes: _Lanes) -> str | None:
     """Home both axes and switch the laser on; the reason if that fails.
 
     If an index looks at the Sun, the ranger moves away by itself, and is lit afterwards.
     """
-    ask = _LocalClient(ranger, clock)
+    ask = _LocalClient(ranger, clock, lanes)
     for command, *parameters in HOMING:
         reply = await ask.reply(Request(command, tuple(parameters)), HOMING_TIMEOUT)
         if reply.ok is not True and command == "PS" and ranger.in_sun:
@@ -173,8 +253,8 @@ def _lit_from(ranger: Ranger) -> str:
 class _LocalClient:
     """A ranger commanded without a connection."""
 
-    def __init__(self, ranger: Ranger, clock: WarmingClock):
-        self._ranger, self._clock, self._tid = ranger, clock, FIRST_CLIENT_TID
+    def __init__(self, ranger: Ranger, clock: WarmingClock, lanes: _Lanes):
+        self._ranger, self._clock, self._lanes, self._tid = ranger, clock, lanes, FIRST_CLIENT_TID
 
     async def reply(self, request: Request, timeout: float) -> Reply:
         """Reply to a request; f = 0 without one in time.
@@ -188,11 +268,11 @@ class _LocalClient:
             for out in replies:
                 if out.reply.tid == self._tid or out.reply.command == "LINE":
                     return out.reply
-            if self._clock.now_ns() >= until:
+            if self._clock.now_ns() >= until or self._clock.over:
                 return Reply(request.command, False, ("no reply",), 0, None)
             replies = self._ranger.turn()
             if not replies:
-                self._clock.advance(STEP)
+                await self._lanes.advance()
 
     async def until(self, condition: Callable[[], bool], timeout: float) -> None:
         """Run the ranger until a condition holds.
@@ -203,5 +283,5 @@ class _LocalClient:
             if condition():
                 return
             self._ranger.turn()
-            self._clock.advance(STEP)
+            await self._lanes.advance()
             await asyncio.sleep(0.0)

@@ -158,7 +158,14 @@ class Sparse:
         return self.solve(unit)
 
     def within(self, columns: np.ndarray) -> np.ndarray:
-        return self.across(columns)[columns]
+        from catseye.estimation.least_squares.sparse_kernel import solve_units
+
+        free = np.flatnonzero(self.place[columns] >= 0)
+        at = self.place[columns[free]]
+        result = np.zeros((len(columns), len(columns)))
+        solved = solve_units(self.lp, self.li, self.lx, self.d, at, self.scale[at])
+        result[np.ix_(free, free)] = solved * self.scale[at][:, None]
+        return result
 
     def products(self, columns: np.ndarray, a: np.ndarray) -> np.ndarray:
         from catseye.estimation.least_squares.sparse_kernel import products

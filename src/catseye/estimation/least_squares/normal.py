@@ -47,7 +47,7 @@ class NormalEquations:
     _scale: np.ndarray = field(default_factory=lambda: np.zeros(0))
     _floating: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     _order: tuple[np.ndarray, ...] = ()
-    _pattern: csc_array | None = None
+    _pattern: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # places, indices, pointers
     _solved: BorderedCovariance | None = None
     _values: np.ndarray = field(default_factory=lambda: np.zeros(0))  # of the rows that are to be solved,
     _refine: bool = False  # by a covariance that is nearly theirs
@@ -216,7 +216,8 @@ class NormalEquations:
             if not on and r.columns.ndim == 1:
                 normal[np.ix_(r.columns, r.columns)] += j.T @ j
             elif not on:
-                normal += _gram(r, j, self.size).toarray()
+                own, gram = _gram(r, j)
+                normal[np.ix_(own, own)] += gram.toarray()
         return normal
 
     def _factorise_bordered(self, border: Border) -> None:
@@ -301,39 +302,45 @@ class NormalEquations:
     def _on_pattern(self) -> csc_array:
         """N (n, n) with an entry for each two parameters that meet in a row, also where their products cancel to zero.
 
-        Sums of sparse matrices leave zeros out; a covariance is wanted of such pairs as of others.
+        A covariance is wanted of such pairs as of others. Groups are added in their order, each over its own entries.
         """
         if self._pattern is None:
-            ones = [_gram(r, np.ones_like(j), self.size) for r, j in zip(self.rows, self._jacobians, strict=True)]
-            self._pattern = csc_array(sum(ones, csc_array((self.size, self.size))))
-            self._pattern.sort_indices()
-        normal = csc_array((self.size, self.size))
+            ones = [
+                _places(*_gram(r, np.ones_like(j)), self.size) for r, j in zip(self.rows, self._jacobians, strict=True)
+            ]
+            places = np.unique(np.concatenate(ones))
+            pointers = np.searchsorted(places, self.size * np.arange(self.size + 1, dtype=np.int64))
+            self._pattern = places, (places % self.size).astype(np.int32), pointers.astype(np.int32)
+        places, indices, pointers = self._pattern
+        data = np.zeros(len(places))
         for r, j in zip(self.rows, self._jacobians, strict=True):
-            normal = csc_array(normal + _gram(r, j, self.size))
-        normal.sort_indices()
-        data = np.zeros(self._pattern.nnz)
-        data[np.searchsorted(_places(self._pattern), _places(normal))] = normal.data
-        return csc_array((data, self._pattern.indices, self._pattern.indptr), shape=normal.shape)
+            own, gram = _gram(r, j)
+            data[np.searchsorted(places, _places(own, gram, self.size))] += gram.data
+        return csc_array((data, indices, pointers), shape=(self.size, self.size))
 
     def _set_floating(self, directions: np.ndarray) -> None:
         self._floating = np.zeros((directions.shape[1], self.size))
         self._floating[:, self.moving] = directions.T
 
 
-def _places(matrix: csc_array) -> np.ndarray:
-    """Column times rows plus row of each entry, rising where indices are sorted."""
-    rows, columns = matrix.shape
-    return np.repeat(np.arange(columns, dtype=np.int64), np.diff(matrix.indptr)) * rows + matrix.indices
+def _places(own: np.ndarray, gram: csc_array, size: int) -> np.ndarray:
+    """Column times size plus row of each entry of a group's A' A, ascending.
+
+    own   (k,) parameters of its rows and columns
+    """
+    return np.repeat(own, np.diff(gram.indptr)).astype(np.int64) * size + own[gram.indices]
 
 
-def _gram(r: ActiveRows, j: np.ndarray, size: int) -> csr_array:
-    """A' A (n, n), sparse, of rows with columns of their own."""
+def _gram(r: ActiveRows, j: np.ndarray) -> tuple[np.ndarray, csc_array]:
+    """Parameters (k,) of rows with columns of their own, ascending, and A' A (k, k) over them, sparse."""
     at = r.row_columns()
-    m = len(at)
-    used = (at >= 0).ravel()
-    pointers = np.concatenate([[0], np.cumsum(np.sum(at >= 0, axis=1))])
-    a = csr_array((j.ravel()[used], at.ravel()[used], pointers), shape=(m, size))
-    return a.T @ a
+    used = at >= 0
+    own, local = np.unique(at[used], return_inverse=True)
+    pointers = np.concatenate([[0], np.cumsum(np.sum(used, axis=1))])
+    a = csr_array((j[used], local.ravel(), pointers), shape=(len(at), len(own)))
+    gram = csc_array(a.T @ a)
+    gram.sort_indices()
+    return own, gram
 
 
 def _ordering(normal: csc_array, moving: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:

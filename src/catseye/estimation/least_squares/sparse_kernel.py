@@ -88,6 +88,48 @@ def solve(lp, li, lx, d, b):
 
 
 @njit(cache=True, error_model="numpy")
+def solve_units(lp, li, lx, d, at, values):
+    """Rows `at` (k, k) of (L D L')^-1 times unit vectors `at` (k,) of some values (k,), as `solve` gives them.
+
+    Only the ancestors of `at` in the elimination tree are visited: all else is zero on the way down, and unused on
+    the way up. The first entry below a column's diagonal is its parent.
+    """
+    n, k = len(d), len(at)
+    local = np.full(n, -1)
+    for c in range(k):
+        j = at[c]
+        while local[j] < 0:
+            local[j] = 0
+            if lp[j] == lp[j + 1]:
+                break
+            j = li[lp[j]]
+    reached = np.flatnonzero(local == 0)
+    for r in range(len(reached)):
+        local[reached[r]] = r
+    b = np.zeros((len(reached), k))
+    for c in range(k):
+        b[local[at[c]], c] = values[c]
+    for r in range(len(reached)):
+        j = reached[r]
+        for p in range(lp[j], lp[j + 1]):
+            i = local[li[p]]
+            for c in range(k):
+                b[i, c] -= lx[p] * b[r, c]
+    for r in range(len(reached) - 1, -1, -1):
+        j = reached[r]
+        for c in range(k):
+            b[r, c] /= d[j]
+        for p in range(lp[j], lp[j + 1]):
+            i = local[li[p]]
+            for c in range(k):
+                b[r, c] -= lx[p] * b[i, c]
+    result = np.empty((k, k))
+    for c in range(k):
+        result[c] = b[local[at[c]]]
+    return result
+
+
+@njit(cache=True, error_model="numpy")
 def selected_inverse(lp, li, lx, d):
     """Inverse on the pattern of L: values in the order of `lx`, and the diagonal.
 

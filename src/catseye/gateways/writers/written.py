@@ -3,6 +3,7 @@
 import csv
 import hashlib
 import io
+import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
@@ -50,6 +51,14 @@ def write_files(
     (directory / PROVENANCE).write_bytes(json_page({**provenance, "outputs": outputs}).encode("utf-8"))
     if progress is not None:
         progress("writing", len(files), len(files))
+
+
+def add_output(directory: Path, name: str) -> None:
+    """Add a file that stands in a directory beside what `write_files` wrote to its provenance."""
+    provenance = json.loads((directory / PROVENANCE).read_text(encoding="utf-8"))
+    with (directory / name).open("rb") as stream:
+        provenance["outputs"][name] = hashlib.file_digest(stream, "sha256").hexdigest()
+    (directory / PROVENANCE).write_bytes(json_page(provenance).encode("utf-8"))
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
