@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from catseye.api.positions import locate
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
+    from catseye.api.scale.design import design
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
@@ -73,6 +74,7 @@ FACE = {  # file of catseye.api -> its exported names
     "positions": ("locate",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
+    "scale.design": ("design",),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
@@ -98,6 +100,7 @@ __all__ = [
     "certificate",
     "check_journal",
     "compare",
+    "design",
     "examples",
     "explain",
     "export",
