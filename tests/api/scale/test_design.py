@@ -32,6 +32,13 @@ def test_a_result_says_before_and_after(result):
     assert said >= {"The design", "The worst axis", "The moves", "The numbers", "The scatter", "The map", "The search"}
 
 
+def test_its_network_is_planned_with_the_same_uncertainties(result):
+    for before, u in ((True, result.u_before), (False, result.u_after)):
+        planned = catseye.plan(result.network(before=before), interest=result.names)
+        longest = dict(zip(planned.names, planned.planned.plan.weakest, strict=True))
+        assert max(longest[name] for name in result.names) == pytest.approx(u, rel=1e-5)
+
+
 def test_tables_have_units_and_all_rows(result):
     points, moves, numbers = (result.to_table(name) for name in ("points", "moves", "numbers"))
     assert str(points["longest_after"].unit) == "mm"

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from catseye.estimation.design.network import RangeVariance
+    from catseye.estimation.network.model import ObservationNetwork
     from catseye.gateways.writers.passage import Passage
     from catseye.gateways.writers.report import ResultReport
     from catseye.records.site.design_layout import DesignLayout
@@ -75,6 +76,16 @@ class DesignResult(Result):
         """Places (3,) m of all points after, by name, each in the frame that carries it."""
         scene = self.study.after.scene
         return {point.name: scene.places[i] for i, point in enumerate(scene.points)}
+
+    def network(self, *, before: bool = False) -> "ObservationNetwork":
+        """Network of the design in its worst posture, for `catseye.plan` and its Monte Carlo.
+
+        before   True: of the design before
+        """
+        from catseye.reduction.design.as_network import network_of_scene
+
+        state = self.study.before if before else self.study.after
+        return network_of_scene(state.scene, state.posture)
 
     def passages(self) -> "Sequence[Passage]":
         """Sentences on design, worst axis, moves, numbers, scatter, maps and search."""
