@@ -7,7 +7,7 @@ from catseye.errors import InputError
 from catseye.estimation.design.network import predict
 from catseye.records.site.design_layout import read_design_layout
 from catseye.records.site.folder import read_site
-from catseye.records.site.solids import Solids
+from catseye.records.site.solids import BoxRecord, Solids
 from catseye.reduction.design.aim import aim_of
 from catseye.reduction.design.regions import Constraints, moving_units
 from catseye.reduction.design.scene import scene_of_layout, scene_of_site
@@ -18,7 +18,8 @@ from repository import ROOT
 
 SITE = read_site(ROOT / "examples" / "sites" / "gbt")
 SCENE = scene_of_site(SITE, Solids())
-SMALL = scene_of_layout(read_design_layout(ROOT / "examples" / "designs" / "structure-60m.toml"), Solids())
+LAYOUT = ROOT / "examples" / "designs" / "structure-60m.toml"
+SMALL = scene_of_layout(read_design_layout(LAYOUT), Solids())
 QUICK = SearchSettings(steps=25, exchanges=0)
 
 
@@ -99,6 +100,27 @@ def test_numbers_that_do_not_fit_are_refused(vary, why):
 def test_two_rangers_too_near_at_the_start_are_refused():
     with pytest.raises(InputError, match="of another ranger"):
         study(SMALL, "worst", ["rangers within 5 m"], StudySettings(QUICK, runs=0, map_side=0), apart=30.0)
+
+
+def test_a_ranger_in_an_obstacle_at_the_start_is_refused():
+    hut = BoxRecord(name="hut", frame="ground", centre_mm=(30e3, 0.0, 0.0), size_mm=(4e3, 4e3, 5e3))
+    scene = scene_of_layout(read_design_layout(LAYOUT), Solids(box=(hut,)))
+    with pytest.raises(InputError, match="RG001 stands in an obstacle"):
+        study(scene, "worst", ["rangers within 5 m"], StudySettings(QUICK, runs=0, map_side=0))
+
+
+def test_a_point_that_no_ranger_sees_is_named():
+    wall = BoxRecord(name="roof", frame="ground", centre_mm=(0.0, 0.0, 12e3), size_mm=(90e3, 90e3, 1e3))
+    scene = scene_of_layout(read_design_layout(LAYOUT), Solids(box=(wall,)))
+    found = study(scene, "trace", ["rangers within 5 m"], StudySettings(QUICK, runs=100, map_side=0))
+    assert found.verdict.word == "doubtful"
+    assert found.verdict.why.startswith("T001 and 29 more are hardly determined")
+
+
+def test_a_solid_that_no_telescope_carries_is_refused():
+    hut = BoxRecord(name="hut", frame="alidade", centre_mm=(30e3, 0.0, 0.0), size_mm=(4e3, 4e3, 5e3))
+    with pytest.raises(InputError, match="'alidade' needs a site"):
+        scene_of_layout(read_design_layout(LAYOUT), Solids(box=(hut,)))
 
 
 def test_maps_hold_the_whole_prediction():

@@ -4,12 +4,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
 
 from catseye.aliases import Array
-from catseye.constants import MILLIMETRE
+from catseye.constants import DEGREE, MILLIMETRE
 from catseye.gateways.design.tables import map_name
 from catseye.gateways.design.words import quantity_of
-from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, styled
+from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, styled
+from catseye.records.site.solids import Solids
 from catseye.reduction.design.maps import DesignMap
 from catseye.reduction.design.scene import GROUND, DesignScene
 from catseye.reduction.design.study import DesignStudy
@@ -17,7 +19,7 @@ from catseye.reduction.design.study import DesignStudy
 WIDTH = 9.4  # inches
 MOST_NAMED = 40  # points with names
 CAPTIONS = {
-    "places": "Places seen from above, ground frame: rangers before (open) and after (full), and targets.",
+    "places": "Seen from above, ground frame: rangers before (open) and after (full), targets, regions and obstacles.",
     "points": "Longest axis of each point of interest before and after; bars are the scatter's where it was simulated.",
     "numbers": "Uncertainty against number, each with its best places found.",
     "search": "Uncertainty during the search; a dashed line begins a stage.",
@@ -74,6 +76,8 @@ def _places(study: DesignStudy) -> Figure:
             label="of interest",
             zorder=3,
         )
+    _regions(ax, study, old)
+    _obstacles(ax, study.constraints.solids)
     for label, rows, points in (("before", before.rangers, old), ("after", after.rangers, new)):
         full = label == "after"
         ax.scatter(
@@ -105,6 +109,37 @@ def _places(study: DesignStudy) -> Figure:
     ax.set(xlabel="x, m (east)", ylabel="y, m (north)", title=f"{after.name}: places, {after.labels[posture]}")
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return figure
+
+
+def _regions(ax: Any, study: DesignStudy, places: Array) -> None:
+    """Draw where rangers on the ground may stand."""
+    scene = study.before.scene
+    for variation in study.varied:
+        for radius in variation.between or ():
+            ax.add_patch(Circle((0.0, 0.0), radius, fill=False, ec=GRID, lw=1.2, zorder=1))
+        for i in scene.rangers:
+            point = scene.points[i]
+            if variation.within is not None and point.frame == GROUND and variation.selects(point.name, "ranger", True):
+                at = (float(places[i, 0]), float(places[i, 1]))
+                ax.add_patch(Circle(at, variation.within, fill=False, ec=GRID, lw=1.0, zorder=1))
+
+
+def _obstacles(ax: Any, solids: Solids) -> None:
+    """Draw boxes, cylinders and spheres that stand on the ground."""
+    style: dict[str, Any] = {"fc": "#e9c9cb", "ec": BAD, "lw": 0.8, "alpha": 0.7, "zorder": 1.5}
+    for box in solids.box:
+        if box.frame == GROUND:
+            half = 0.5 * MILLIMETRE * np.array(box.size_mm[:2])
+            turn, centre = box.turn_deg * DEGREE, MILLIMETRE * np.array(box.centre_mm[:2])
+            corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+            rotation = np.array([(np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))])
+            ax.add_patch(Polygon(corners @ rotation + centre, **style))
+    for at, radius, frame in (
+        *((each.from_mm, each.radius_mm, each.frame) for each in solids.cylinder),
+        *((each.centre_mm, each.radius_mm, each.frame) for each in solids.sphere),
+    ):
+        if frame == GROUND:
+            ax.add_patch(Circle((at[0] * MILLIMETRE, at[1] * MILLIMETRE), radius * MILLIMETRE, **style))
 
 
 def _points(study: DesignStudy) -> Figure:

@@ -18,10 +18,10 @@ NAMED = 4  # moves said
 def design_passages(study: DesignStudy) -> list[Passage]:
     """Sentences on design, worst axis, moves, numbers, scatter, maps and search."""
     before, after, aim = study.before, study.after, study.aim
-    posture = f" in the worst of {len(after.values)} postures, {after.scene.labels[after.posture]}"
+    posture = f", in the worst of {len(after.values)} postures" if len(after.values) > 1 else ""
     text = (
         f"The {quantity_of(aim)} of {len(aim.interest)} points falls from {quantity(before.u, 'm')} to "
-        f"{quantity(after.u, 'm')}, by {100 * study.gain:.1f} %{posture if len(after.values) > 1 else ''}; "
+        f"{quantity(after.u, 'm')}, by {100 * study.gain:.1f} %{posture}; "
         f"{len(after.scene.rangers)} rangers, {after.ranges} ranges."
     )
     passages = [Passage("The design", text)]

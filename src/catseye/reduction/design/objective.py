@@ -93,14 +93,13 @@ class DesignObjective:
         rangers too near each other both stay.
         """
         result = np.array([unit.nearest(place) for unit, place in zip(self.units, wished, strict=True)]).reshape(-1, 3)
-        ranging = [k for k, unit in enumerate(self.units) if unit.ranger and unit.level]
         for _ in range(RETREATS):
-            blocked = self._blocked(ranging, result)
+            blocked = self.blocked(result)
             if not len(blocked):
                 break
             middle = 0.5 * (result[blocked] + present[blocked])
             result[blocked] = [self.units[k].nearest(place) for k, place in zip(blocked, middle, strict=True)]
-        blocked = self._blocked(ranging, result)
+        blocked = self.blocked(result)
         result[blocked] = present[blocked]
         for _ in range(len(self.units)):
             near = self.too_near(result)
@@ -109,9 +108,9 @@ class DesignObjective:
             result[near] = present[near]
         return result
 
-    def _blocked(self, ranging: list[int], places: Array) -> Array:
-        """Indices of ranging units that stand in a solid."""
-        at = np.array(ranging, dtype=int)
+    def blocked(self, places: Array) -> Array:
+        """Indices of the rangers on the ground that stand in a solid or too near one."""
+        at = np.array([k for k, unit in enumerate(self.units) if unit.ranger and unit.level], dtype=int)
         if not len(at) or not self.constraints.solids.all:
             return np.zeros(0, dtype=int)
         return np.asarray(at[~self.constraints.free_of_solids(self.scene, places[at])])

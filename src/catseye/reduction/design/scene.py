@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from catseye.aliases import Array
 from catseye.constants import MILLIMETRE, PPM
+from catseye.errors import InputError
 from catseye.estimation.design.network import DesignNetwork, RangeVariance, Unit
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.retroreflector.kinds.kind import RetroreflectorKind
@@ -226,7 +227,12 @@ def scene_of_layout(layout: DesignLayout, solids: Solids, *, claim: RangeVarianc
 
     solids   that obstruct beams
     claim    of a range, instead of the file's
+
+    Raises InputError for a solid that a telescope carries.
     """
+    carried = next((solid for solid in solids.all if solid.frame != GROUND), None)
+    if carried is not None:
+        raise InputError(f"{carried.name}: frame = {carried.frame!r} needs a site with a telescope (expected 'ground')")
     points = []
     for rangers in layout.rangers:
         for name, place in zip(rangers.names, rangers.places, strict=True):

@@ -84,6 +84,12 @@ def improved(
         raise InputError(
             f"{units[near[0]].name} stands within {constraints.apart:g} m of another ranger (expected less apart)"
         )
+    blocked = objective.blocked(objective.places)
+    if len(blocked):
+        raise InputError(
+            f"{units[blocked[0]].name} stands in an obstacle or within {constraints.clearance:g} m of one "
+            "(expected less clearance, or another place to begin with)"
+        )
     places, value = objective.places, objective.value(scene)
     reach = 0.25 * min(unit.reach for unit in units)
     for turn in range(settings.exchanges + 1):

@@ -107,6 +107,14 @@ class DesignState:
         k = int(np.argmax(sizes))
         return self.aim.interest[k], axes[k]
 
+    @property
+    def loose(self) -> tuple[str, ...]:
+        """Points of interest that the ranges hardly determine: an axis is half as long as its prior, or longer."""
+        u = [max(self.scene.points[self.scene.row[name]].u) for name in self.aim.interest]
+        return tuple(
+            name for name, size, most in zip(self.aim.interest, self.longest[0], u, strict=True) if size > 0.5 * most
+        )
+
     @cached_property
     def pose_u(self) -> Array | None:
         """Standard uncertainties (6,) of the pose, m and rad, of the points of interest; None for another criterion."""
@@ -227,7 +235,10 @@ class DesignStudy:
 
 
 def _verdict(study: DesignStudy) -> Verdict:
-    limit = study.settings.limit
+    limit, loose = study.settings.limit, study.after.loose
+    if loose:
+        named = f"{loose[0]} and {len(loose) - 1} more are" if len(loose) > 1 else f"{loose[0]} is"
+        return Verdict("doubtful", f"{named} hardly determined by any range; see what is visible, or leave it out")
     if limit is not None and study.after.u > limit:
         return Verdict("doubtful", f"the limit of {limit * 1e3:.3g} mm is not reached: {study.after.u * 1e3:.3g} mm")
     if study.scatter is not None:
