@@ -32,6 +32,7 @@ LARGEST_DEPARTURE = 4.0  # of its own u: a mean square of the scatter farther fr
 LEAST_GAIN = 0.01  # of the uncertainty: less is no improvement worth a pillar
 MOST_NUMBERS = 40
 SMALLEST_MOVE = 1e-3  # m
+MANY_RANGERS = 60  # from which linear algebra may have several threads
 
 
 @dataclass(frozen=True)
@@ -281,7 +282,8 @@ def design_study(
         if progress is not None:
             progress(what, 0, 0)
 
-    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
+    few = 1 if len(scene.rangers) < MANY_RANGERS else None
+    with threadpool_limits(limits=few, user_api="blas"):  # spinning pools make small matrices many times slower
         before = DesignState.of(scene, aim)
         path, start = SearchPath(), perf_counter()
         designed, numbers = _numbered(scene, aim, varied, constraints, settings=settings, path=path, tell=tell)
