@@ -18,6 +18,7 @@ from catseye.reduction.design.study import DesignStudy
 
 WIDTH = 9.4  # inches
 MOST_NAMED = 40  # points with names
+LEVELS = 8  # contours of a map
 CAPTIONS = {
     "places": "Seen from above, ground frame: rangers before (open) and after (full), targets, regions and obstacles.",
     "points": "Longest axis of each point of interest before and after; bars are the scatter's where it was simulated.",
@@ -187,9 +188,11 @@ def _map(study: DesignStudy, drawn: DesignMap) -> Figure:
     ax = figure.add_subplot(aspect="equal")
     shown = np.ma.masked_invalid(drawn.u / MILLIMETRE)
     image = ax.pcolormesh(drawn.x, drawn.y, shown, shading="nearest", cmap="viridis_r", rasterized=True)
-    if np.ptp(shown.compressed()) > 0.0:
-        lines: Any = ax.contour(drawn.x, drawn.y, shown, levels=8, colors="white", linewidths=0.7)
-        ax.clabel(lines, fontsize=7.0, fmt="%.4f")
+    span = float(np.ptp(shown.compressed()))
+    if span > 0.0:
+        digits = int(np.ceil(1.0 - np.log10(span / LEVELS)))
+        lines: Any = ax.contour(drawn.x, drawn.y, shown, levels=LEVELS, colors="white", linewidths=0.7)
+        ax.clabel(lines, fontsize=7.0, fmt=f"%.{max(digits, 0)}f")
     figure.colorbar(image, ax=ax, label=f"{quantity_of(study.aim)}, mm", shrink=0.85)
     scene = study.after.scene
     ground = np.array([scene.places[i, :2] for i in scene.rangers if scene.points[i].frame == GROUND])
