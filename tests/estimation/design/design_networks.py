@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.estimation.design.network import DesignNetwork, RangeVariance, Unit
+from catseye.estimation.design.network import DesignNetwork, RangeVariance, TiedPoints
 
 
 def few(seed=1, rangers=6, targets=9, triplets=2):
@@ -19,7 +19,8 @@ def few(seed=1, rangers=6, targets=9, triplets=2):
     information[: rangers - 2] = np.eye(3) / 1e-4**2
     row = np.hstack([np.eye(3), -0.5 * np.eye(3), -0.5 * np.eye(3)])
     units = tuple(
-        Unit(tuple(rangers + targets + 3 * k + i for i in range(3)), row.T @ row / 5e-5**2) for k in range(triplets)
+        TiedPoints(tuple(rangers + targets + 3 * k + i for i in range(3)), row.T @ row / 5e-5**2)
+        for k in range(triplets)
     )
     return DesignNetwork(
         points=points,

@@ -8,7 +8,7 @@ import pytest
 from catseye.errors import EstimationError
 from catseye.estimation.design.addition import with_ranger
 from catseye.estimation.design.criteria import BodyPose, MeanVariance, SurfaceVariance, WorstAxis
-from catseye.estimation.design.network import Unit, predict
+from catseye.estimation.design.network import TiedPoints, predict
 from estimation.design.design_networks import dense_covariance, few
 
 ROUNDING = 1e-10  # of the largest element: condition 1e13 before, 1e6 after scaling
@@ -34,7 +34,7 @@ def test_products_with_columns_are_those_of_the_whole_covariance():
 
 
 def test_a_tied_ranger_is_refused():
-    network = replace(few(), units=(Unit((0, 7, 8), np.eye(9)),))
+    network = replace(few(), units=(TiedPoints((0, 7, 8), np.eye(9)),))
     with pytest.raises(EstimationError, match="a tied point is a ranger"):
         predict(network)
 

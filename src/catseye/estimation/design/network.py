@@ -34,7 +34,7 @@ class RangeVariance:
 
 
 @dataclass(frozen=True, eq=False)
-class Unit:
+class TiedPoints:
     """Points tied to each other, eliminated together.
 
     points        (k,) rows of the points
@@ -66,7 +66,7 @@ class DesignNetwork:
     information: Array
     u_zero: Array
     u_scale: float
-    units: tuple[Unit, ...] = ()
+    units: tuple[TiedPoints, ...] = ()
 
     @cached_property
     def ranger_of(self) -> NDArray[np.int64]:

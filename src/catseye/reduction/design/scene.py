@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from catseye.aliases import Array
 from catseye.constants import MILLIMETRE, PPM
 from catseye.errors import InputError
-from catseye.estimation.design.network import DesignNetwork, RangeVariance, Unit
+from catseye.estimation.design.network import DesignNetwork, RangeVariance, TiedPoints
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.retroreflector.kinds.kind import RetroreflectorKind
 from catseye.records.site.design_layout import DesignLayout
@@ -178,7 +178,7 @@ class DesignScene:
         """Network of all ranges that are visible in a posture, each once."""
         points = self.on_ground(posture)
         units = tuple(
-            Unit(
+            TiedPoints(
                 tuple(self.row[name] for name in tie.names),
                 tie.information(np.asarray(self.postures[posture][tie.frame].rotation)),
             )
