@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
     from catseye.api.scale.archive import archive, restore
+    from catseye.api.scale.design import design
     from catseye.api.scale.many import reduce_nights
     from catseye.api.scale.many_runs import replay_journals, simulate_runs
     from catseye.api.scale.query import query
@@ -78,6 +79,7 @@ FACE = {  # file of catseye.api -> its exported names
     "reading": ("examples", "load"),
     "result": ("save", "show"),
     "scale.archive": ("archive", "restore"),
+    "scale.design": ("design",),
     "scale.many": ("reduce_nights",),
     "scale.many_runs": ("replay_journals", "simulate_runs"),
     "scale.query": ("query",),
@@ -107,6 +109,7 @@ __all__ = [
     "certificate",
     "check_journal",
     "compare",
+    "design",
     "examples",
     "explain",
     "export",

@@ -252,6 +252,12 @@ SOURCES: dict[str, Source] = {
         locator="ISBN 978-0-12-250750-3",
         used="sequential design: each further observation the best after those before it",
     ),
+    "BIRGIN00": Source(
+        title="E. G. Birgin, J. M. Martinez and M. Raydan, Nonmonotone spectral projected gradient methods on convex "
+        "sets, SIAM Journal on Optimization 10, 2000",
+        locator="doi:10.1137/S1052623497330963",
+        used="descent of a design's criterion within regions",
+    ),
     "CROCCO12": Source(
         title="M. Crocco, A. Del Bue and V. Murino, A bilinear approach to the position self-calibration of multiple "
         "sensors, 2012",

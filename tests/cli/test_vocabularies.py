@@ -24,6 +24,7 @@ from catseye.ranger import addresses
 from catseye.records.site.target import FrameName
 from catseye.reduction.calibrations import kinds
 from catseye.reduction.calibrations.field_report import FORMS
+from catseye.reduction.design import aim
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.network.treatment import AdjustmentOptions
 from catseye.reduction.pose import pointing_offsets
@@ -46,6 +47,7 @@ SOURCES = {
     "REPORT_KINDS": FORMS,
     "DATUMS": datum.DATUMS,
     "NETWORK_WEIGHTS": [name for name in WEIGHTS if name != "geman_mcclure"],  # whose constant is our own choice
+    "DESIGN_CRITERIA": aim.CRITERIA,
     "POSE_GROUPS": pose_recipe.GROUPS,
     "POSE_FRAMES": pose_recipe.FRAMES,
     "POSE_WEIGHTS": pose.METHODS,

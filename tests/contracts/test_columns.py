@@ -146,6 +146,8 @@ COMMANDS = {  # directory -> the command that writes it; night: of the one befor
     "network": ["adjust", NETWORK],
     "epochs": ["adjust", NETWORK, NETWORK],
     "plan": ["plan", NETWORK, "--budget-s", 600, "--shot-s", 5],
+    "design": ["design", EXAMPLES / "designs" / "structure-60m.toml", "--steps", 2, "--exchanges", 0, "--runs", 100,
+               "--map-side", 3, "--vary", "rangers from 8 to 9 between 5 and 45 m"],
     "baseline": ["baseline", BASELINE / "ts30-baseline-observations.csv", *HEIGHTS],
     "acoustic": ["acoustic", ACOUSTIC / "evening-1.wav", "--sheet", ACOUSTIC / "evening.toml"],
     "refractometer": ["refractometer", EXAMPLES / "refractometer" / "path-a.csv"],

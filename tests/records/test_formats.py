@@ -18,6 +18,7 @@ from catseye.records.panels.actuators import ActuatorCorrection, ActuatorPositio
 from catseye.records.panels.instrument import PanelInstrument
 from catseye.records.panels.layout import PanelCorner
 from catseye.records.site.beam import BeamTrain
+from catseye.records.site.design_layout import DesignLayout
 from catseye.records.site.interlock import Interlocks
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import Mirror, MirrorGeometry
@@ -56,6 +57,7 @@ RECORDS: dict[str, type[Record]] = {
     "pointing-series-1.toml": PointingModel,
     "laboratory-1.toml": LaboratoryRecord,
     "job-1.toml": CertificateJob,
+    "design-1.toml": DesignLayout,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (BenchmarkRow, 6),

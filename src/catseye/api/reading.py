@@ -151,6 +151,7 @@ TOML_READERS = {  # kind in `format` -> key that tells a file without one, and t
     "calibration": ("quantity", "catseye.records.laboratory.calibration.CalibrationRecord"),
     "baseline": ("pillars", "catseye.records.laboratory.baseline.Baseline"),
     "panel-instrument": ("gauge", "catseye.records.panels.instrument.PanelInstrument"),
+    "design": ("targets", "catseye.records.site.design_layout.DesignLayout"),
     "keep-out": ("boxes", "catseye.records.site.keep_out.KeepOut"),
     "solids": ("box", "catseye.records.site.solids.read_solids"),
     "beam": ("element", "catseye.records.site.beam.BeamTrain"),

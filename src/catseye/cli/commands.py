@@ -24,12 +24,12 @@ ROOMS = (
     *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
-    *("scale.archive", "scale.query"),
+    *("scale.archive", "scale.query", "scale.design"),
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples"),
     "A night of ranges": ("reduce", "explain", "night"),
-    "Networks": ("adjust", "plan", "baseline"),
+    "Networks": ("adjust", "plan", "design", "baseline"),
     "The telescope": ("pose", "surface", "pointing", "structure", "panels"),
     "Laboratory": ("calibrate", "certificate", "triplet"),
     "Air": ("air", "sound", "refractometer", "acoustic"),

@@ -33,6 +33,7 @@ REPORT_KINDS = "monument|mirror"
 DATUMS = "free|fixed"
 NETWORK_WEIGHTS = "huber|l1|biweight|igg3"
 COMPONENTS = "rangers|groups"
+DESIGN_CRITERIA = "trace|worst|pose|gain"
 
 # the telescope
 POSE_GROUPS = "dish|feed-arm|alidade|subreflector"

@@ -1,0 +1,1 @@
+"""Design studies as sentences, objects, tables, figures and report."""

@@ -1,0 +1,1 @@
+"""Design studies: number and place of rangers and targets."""
