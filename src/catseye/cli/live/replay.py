@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from catseye.cli.commands import Json, Quiet, app
+from catseye.cli.many_options import NOTHING_SAID, Several, progress_of_many, refuse_several, tell_many
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import tell
-from catseye.cli.scale.options import NOTHING_SAID, Several, progress_of_many, refuse_several, tell_many
 from catseye.cli.terminal import ProgressLine
 
 JournalArgument = Annotated[str, typer.Argument(metavar="JOURNAL", help="File, or postgresql://USER@HOST/DATABASE.")]

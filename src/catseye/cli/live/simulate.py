@@ -26,9 +26,9 @@ from catseye.cli.live.options import (
     leave,
     within,
 )
+from catseye.cli.many_options import NOTHING_SAID, Several, progress_of_many, refuse_several, tell_many
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import tell
-from catseye.cli.scale.options import NOTHING_SAID, Several, progress_of_many, refuse_several, tell_many
 from catseye.cli.terminal import say
 
 
