@@ -7,10 +7,10 @@ STAMP := .venv/.catseye-installed
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(1 + (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()))')
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: help setup check style types test tests test-all test-web front front-check demo bench release clean
+.PHONY: help setup check style types test tests test-all test-web front front-check demo bench bench-guard release clean
 
 help:  ## list the verbs
-	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-9s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "catseye needs Python 3.11 or newer, this is " + sys.version.split()[0])'
@@ -63,19 +63,11 @@ front-check: front/node_modules  # types, and the committed files against a new 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
 
-bench: setup  ## benchmarks, as ratios in one run: main job, phases, positions, networks, pointing, air, delays, living site and its start, surfaces
-	$(BIN)/python benchmarks/bench_reduce.py
-	$(BIN)/python benchmarks/bench_phase.py
-	$(BIN)/python benchmarks/bench_positions.py
-	$(BIN)/python benchmarks/bench_network.py
-	$(BIN)/python benchmarks/bench_pointing.py
-	$(BIN)/python benchmarks/bench_air.py
-	$(BIN)/python benchmarks/bench_delay.py
-	$(BIN)/python benchmarks/bench_live.py
-	$(BIN)/python benchmarks/bench_web.py
-	$(BIN)/python benchmarks/bench_start.py
-	$(BIN)/python benchmarks/bench_surface.py
-	$(BIN)/python benchmarks/bench_structure.py
+bench: setup  ## all benchmarks beside others and the machine's limit, in one table: writes docs/benchmarks.md
+	$(BIN)/python benchmarks/run.py --write
+
+bench-guard: setup  ## their quick rows: fails where a ratio fell by a third against the table of `make bench`
+	$(BIN)/python benchmarks/run.py --guard
 
 release: setup  ## a wheel in dist/
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .

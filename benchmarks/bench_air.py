@@ -1,20 +1,14 @@
 """The group index of 10^7 states of air, beside what a user would write instead.
 
-Medians of interleaved rounds; who takes less than half a second runs three times in each and the last counts, as in a
-loop. Every contender makes its answer in new memory, but for those that say so. Ours takes a thread a processor but
-where said, the others one. The notes' model in float64 at 0.780 um; GeodePy has only Ciddor's, and is given its vapour
-pressure by numpy where it runs over arrays, as its own takes one number at a time. `pip install geodepy` to see it;
-without it those lines are left out.
-python benchmarks/bench_air.py
+python benchmarks/bench_air.py [--quick]
+
+Every contender makes its answer in new memory, but for the row that says so. Ours takes a thread a processor but where
+said, the others and the limits one. The notes' model in float64 at 0.780 um; GeodePy has only Ciddor's, and is given
+its vapour pressure by numpy where it runs over arrays, as its own takes one number at a time.
 """
 
-import os
-import statistics
 import sys
-import time
-from collections.abc import Callable
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numba import njit
@@ -22,11 +16,11 @@ from numba import njit
 from catseye.atmosphere.index import air, air_kernel, ciddor_hill1999_kernel, rueger1990_kernel
 from catseye.atmosphere.index.air import MODELS
 from catseye.atmosphere.weather import humidity
+from harness import LIMIT, Contender, Row, main, missing, raced
 
-ROUNDS, STATES, SCALARS, BLOCK = 5, 10_000_000, 20_000, 4096
-REPEATS, SHORT = 3, 0.5
+STATES, SCALARS, PART, BLOCK = 10_000_000, 5_000, 1_000_000, 4096
 WAVELENGTH_UM, CO2_PPM = 0.780, 450.0
-Contender = tuple[Callable[[], np.ndarray], int]
+WHAT = f"{STATES:.0e} states, each limit checked"
 
 
 def weather() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -115,83 +109,88 @@ def compiled(module, t: np.ndarray, p: np.ndarray, h: np.ndarray) -> np.ndarray:
     return values
 
 
-def geodepy(t: np.ndarray, p: np.ndarray, h: np.ndarray) -> dict[str, Contender]:
-    """GeodePy's group refractivity over arrays and one state at a time, where it is installed."""
-    try:
-        from geodepy.survey import group_refractivity, humidity2part_water_vapour_press
-    except ImportError:
-        sys.stdout.write("GeodePy is not installed: no line for it\n")
-        return {}
+def geodepy_arrays(t: np.ndarray, p: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """GeodePy's group refractivity over arrays."""
+    from geodepy.survey import group_refractivity
 
-    def arrays() -> np.ndarray:
-        kelvin = t + 273.15
-        saturated = np.exp(1.2378847e-5 * kelvin * kelvin - 1.9121316e-2 * kelvin + 33.93711047 - 6.3431645e3 / kelvin)
-        return 1e-8 * group_refractivity(WAVELENGTH_UM, t, p, h / 1e4 * saturated, CO2_PPM)
-
-    def scalars() -> np.ndarray:
-        states = zip(t[:SCALARS].tolist(), p[:SCALARS].tolist(), h[:SCALARS].tolist(), strict=True)
-        return np.array([
-            1e-8 * group_refractivity(WAVELENGTH_UM, a, b, humidity2part_water_vapour_press(c, a), CO2_PPM)
-            for a, b, c in states
-        ])  # fmt: skip
-
-    return {
-        "GeodePy over arrays (Ciddor)": (arrays, STATES),
-        "GeodePy, a state at a time (Ciddor)": (scalars, SCALARS),
-    }
+    kelvin = t + 273.15
+    saturated = np.exp(1.2378847e-5 * kelvin * kelvin - 1.9121316e-2 * kelvin + 33.93711047 - 6.3431645e3 / kelvin)
+    return 1e-8 * group_refractivity(WAVELENGTH_UM, t, p, h / 1e4 * saturated, CO2_PPM)
 
 
-def contenders(t: np.ndarray, p: np.ndarray, h: np.ndarray) -> dict[str, Contender]:
+def geodepy_scalars(t: np.ndarray, p: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """GeodePy's group refractivity, a state at a time."""
+    from geodepy.survey import group_refractivity, humidity2part_water_vapour_press
+
+    return np.array([
+        1e-8 * group_refractivity(WAVELENGTH_UM, a, b, humidity2part_water_vapour_press(c, a), CO2_PPM)
+        for a, b, c in zip(t.tolist(), p.tolist(), h.tolist(), strict=True)
+    ])  # fmt: skip
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    """The notes' model and Ciddor's, each by its kernel and by the public function."""
+    t, p, h = weather()
     own, other = np.zeros(STATES), np.zeros(STATES)
     light = {"wavelength_um": WAVELENGTH_UM, "co2_ppm": CO2_PPM}
-    return {
-        "catseye, compiled": (lambda: compiled(rueger1990_kernel, t, p, h), STATES),
-        "  in memory that is there, one thread": (lambda: kernel(t, p, h, own), STATES),
-        "  the public function with its checks": (
-            lambda: air.group_refractivity(t, p, h, model="rueger1990", **light), STATES,
-        ),
-        "limit: the same bytes, new memory": (lambda: stream(t, p, h, np.empty(STATES)), STATES),
-        "limit: in memory that is there": (lambda: stream(t, p, h, other), STATES),
-        "numpy in blocks": (lambda: blocked_numpy(t, p, h), STATES),
-        "catseye's plain form (numpy)": (lambda: plain("rueger1990", t, p, h), STATES),
-        "Ciddor-Hill, compiled": (lambda: compiled(ciddor_hill1999_kernel, t, p, h), STATES),
-        "  the public function with its checks ": (lambda: air.group_refractivity(t, p, h, **light), STATES),
-        "Ciddor-Hill, plain form (numpy)": (lambda: plain("ciddor_hill1999", t, p, h), STATES),
-        **geodepy(t, p, h),
-    }  # fmt: skip
+    few, one = (t[:PART], p[:PART], h[:PART]), (t[:SCALARS], p[:SCALARS], h[:SCALARS])
+    streamed = Contender(lambda: stream(t, p, h, np.empty(STATES)))
+    absent = missing("geodepy")
 
+    def apart(name: str, values: np.ndarray) -> str:
+        return f"largest difference to the plain form {np.abs(values[:PART] - plain(name, *few)).max():.0e}"
 
-def _last(job: Callable[[], np.ndarray]) -> float:
-    """Seconds of a run, of the third where runs are short."""
-    took = 0.0
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        job()
-        took = time.perf_counter() - start
-        if took > SHORT:
-            break
-    return took
+    def part(work: Callable[[], np.ndarray], states: int) -> Contender:
+        return Contender(work, states / STATES)
 
-
-def main() -> None:
-    t, p, h = weather()
-    jobs = contenders(t, p, h)
-    exact = {name: plain(name, t, p, h) for name in ("rueger1990", "ciddor_hill1999")}
-    apart: dict[str, str] = {}
-    for name, (job, count) in jobs.items():  # also compiles
-        model = "ciddor_hill1999" if "Ciddor" in name or name.endswith(" ") else "rueger1990"
-        same = float(np.max(np.abs(job() - exact[model][:count])))
-        apart[name] = "" if name.startswith("limit") else f"   apart {same:.0e}"
-    spent: dict[str, list[float]] = {name: [] for name in jobs}
-    for _ in range(ROUNDS):
-        for name, (job, count) in jobs.items():
-            spent[name].append(_last(job) / count)
-    ours = statistics.median(spent["catseye, compiled"])
-    sys.stdout.write(f"{STATES:.0e} states, the notes' model but where said\n")
-    for name, times in spent.items():
-        took = statistics.median(times)
-        sys.stdout.write(f"  {name:<42}{1e-6 / took:8.2f} M/s  {took / ours:8.2f} x ours{apart[name]}\n")
+    yield raced(
+        "index of air",
+        WHAT,
+        {
+            "catseye": Contender(lambda: compiled(rueger1990_kernel, t, p, h)),
+            "numpy in cache-sized blocks": part(lambda: blocked_numpy(*few), PART),
+            "numpy, whole arrays": part(lambda: plain("rueger1990", *few), PART),
+            LIMIT: streamed,
+        },
+        quick=quick,
+        note=apart("rueger1990", compiled(rueger1990_kernel, t, p, h)),
+    )
+    yield raced(
+        "index of air, one thread",
+        "the same in memory that is there",
+        {
+            "catseye": Contender(lambda: kernel(t, p, h, own)),
+            "numpy in cache-sized blocks": part(lambda: blocked_numpy(*few), PART),
+            LIMIT: Contender(lambda: stream(t, p, h, other)),
+        },
+        quick=quick,
+    )
+    ciddor: dict[str, Contender] = {
+        "catseye": Contender(lambda: compiled(ciddor_hill1999_kernel, t, p, h)),
+        "numpy, whole arrays": part(lambda: plain("ciddor_hill1999", *few), PART),
+    }
+    if not absent:
+        ciddor["GeodePy over arrays"] = part(lambda: geodepy_arrays(*few), PART)
+        ciddor["GeodePy, a state at a time"] = part(lambda: geodepy_scalars(*one), SCALARS)
+    yield raced(
+        "index of air by Ciddor and Hill",
+        WHAT,
+        ciddor | {LIMIT: streamed},
+        quick=quick,
+        note=apart("ciddor_hill1999", compiled(ciddor_hill1999_kernel, t, p, h)),
+        skipped=absent,
+    )
+    yield raced(
+        "index of air, public function",
+        WHAT,
+        {
+            "catseye": Contender(lambda: air.group_refractivity(t, p, h, model="rueger1990", **light)),
+            "numpy in cache-sized blocks": part(lambda: blocked_numpy(*few), PART),
+            LIMIT: streamed,
+        },
+        quick=quick,
+    )
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

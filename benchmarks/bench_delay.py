@@ -1,25 +1,25 @@
 """When a known pulse arrived in 1 s of sound at 48 kHz, beside what a user would write instead: time and scatter.
 
-Medians of interleaved rounds. `once` is one recording a call; `many` is 100 a call, per recording. Scatter is the root
-mean square of 400 delays over the Cramer-Rao bound, at 40 dB and at 0 dB of signal over noise within the pulse; the
-floor is what is left without noise, at worst over a sample. scipy correlates the whole second and a parabola goes
-through three samples; the same within the window about the predicted arrival is shown beside it.
-python benchmarks/bench_delay.py
+python benchmarks/bench_delay.py [--quick]
+
+One recording a call, then many a call. Scatter is the root mean square of 400 delays over the Cramer-Rao bound, at 40
+dB and at 0 dB of signal over noise within the pulse; the floor is the largest error without noise over a sample. scipy
+correlates the whole second, or the window about the predicted arrival, and a parabola goes through three samples. The
+limit reads the samples that the pulse and its window need.
 """
 
-import statistics
-import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.signal import correlate
-from threadpoolctl import threadpool_limits
 
+import limits
 from catseye.signal.delay.arrival import DelayPlan
 from catseye.signal.delay.waveform import chirp, sampled
+from harness import LIMIT, Contender, Row, main, raced
 
-ROUNDS, ONCE, MANY = 15, 20, 100
+MANY, FEW = 100, 10
 SAMPLING_HZ, EXPECTED, WINDOW, TRIALS = 48e3, 0.3, 2e-3, 400
 SIGNAL = {"start_hz": 2e3, "stop_hz": 8e3, "duration": 10e-3}
 TEMPLATE = sampled("chirp", SAMPLING_HZ, **SIGNAL)
@@ -49,53 +49,63 @@ def scipy_window(heard: np.ndarray) -> float:
     return (first + parabola(correlate(heard[first:last], TEMPLATE, mode="valid"))) / SAMPLING_HZ
 
 
-def took(job: Callable[[], object], times: int) -> float:
-    start = time.perf_counter()
-    for _ in range(times):
-        job()
-    return (time.perf_counter() - start) / times
+def each(form: Callable[[np.ndarray], float], heard: np.ndarray) -> np.ndarray:
+    """Delays of recordings one after another."""
+    return np.array([form(row) for row in np.atleast_2d(heard)])
 
 
-def main() -> None:
-    compiled = DelayPlan(TEMPLATE, sampling_hz=SAMPLING_HZ, window=WINDOW, compiled=True)
-    plain = DelayPlan(TEMPLATE, sampling_hz=SAMPLING_HZ, window=WINDOW, compiled=False)
+def accuracy(form: Callable[[np.ndarray], np.ndarray], bound: Callable[[float], float]) -> str:
+    """Scatter over the bound at 40 and 0 dB, and the error without noise."""
+    true = EXPECTED + np.random.default_rng(7).uniform(-1e-3, 1e-3, TRIALS)
+    fine = EXPECTED + np.linspace(0.0, 1.0 / SAMPLING_HZ, 41)
+    energy = np.sum(TEMPLATE**2) / np.mean(TEMPLATE**2)
+    over = [
+        np.sqrt(np.mean((form(recordings(true, db)) - true) ** 2)) / bound(energy * 10.0 ** (db / 10.0))
+        for db in (40.0, 0.0)
+    ]
+    floor = np.abs(form(recordings(fine, np.inf)) - fine).max()
+    return f"{over[0]:.2f} and {over[1]:.2f} of the bound, floor {floor * 1e9:.2g} ns"
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    """One recording a call, and a hundred."""
+    compiled, plain = (
+        DelayPlan(TEMPLATE, sampling_hz=SAMPLING_HZ, window=WINDOW, compiled=flag) for flag in (True, False)
+    )
     forms: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "catseye": lambda x: compiled(x, EXPECTED).delay,
-        "catseye's plain form (numpy)": lambda x: plain(x, EXPECTED).delay,
-        "scipy.signal.correlate, parabola": lambda x: np.array([scipy_whole(row) for row in np.atleast_2d(x)]),
-        "the same, within the window": lambda x: np.array([scipy_window(row) for row in np.atleast_2d(x)]),
+        "scipy.signal.correlate, parabola": lambda x: each(scipy_whole, x),
+        "the same within the window": lambda x: each(scipy_window, x),
+        "catseye, plain numpy": lambda x: plain(x, EXPECTED).delay,
     }
-    rng = np.random.default_rng(7)
-    true = EXPECTED + rng.uniform(-1e-3, 1e-3, TRIALS)
-    noisy = {db: recordings(true, db) for db in (40.0, 0.0)}
-    fine = EXPECTED + np.linspace(0.0, 1.0 / SAMPLING_HZ, 41)
-    silent = recordings(fine, np.inf)
-    once: dict[str, list[float]] = {name: [] for name in forms}
-    many: dict[str, list[float]] = {name: [] for name in forms}
-    with threadpool_limits(1):
-        for form in forms.values():
-            form(noisy[40.0][:2])
-        for _ in range(ROUNDS):
-            for name, form in forms.items():
-                once[name].append(took(lambda form=form: form(noisy[40.0][0]), ONCE))  # type: ignore[misc]
-                share = MANY if name.startswith("catseye") else 5
-                many[name].append(took(lambda form=form, n=share: form(noisy[40.0][:n]), 1) / share)  # type: ignore[misc]
-    ours = statistics.median(once["catseye"])
-    sys.stdout.write(f"a chirp of {len(TEMPLATE)} samples in {len(TIME)}, window {WINDOW * 1e3:g} ms either way\n")
-    sys.stdout.write(f"{'':<36}{'once':>10}{'ratio':>9}{'many':>10}{'40 dB':>9}{'0 dB':>9}{'floor':>12}\n")
-    for name, form in forms.items():
-        spent, each = statistics.median(once[name]), statistics.median(many[name])
-        energy = np.sum(TEMPLATE**2) / np.mean(TEMPLATE**2)
-        over = [
-            np.sqrt(np.mean((form(noisy[db]) - true) ** 2)) / float(compiled.bound(energy * 10.0 ** (db / 10.0)))
-            for db in noisy
-        ]
-        floor = np.abs(form(silent) - fine).max()
-        sys.stdout.write(
-            f"  {name:<34}{spent * 1e6:7.0f} us{spent / ours:7.1f} x{each * 1e6:7.0f} us"
-            f"{over[0]:8.2f} {over[1]:8.2f} {floor * 1e9:9.3f} ns\n"
-        )
+    words = np.zeros(len(TEMPLATE) + int(2 * WINDOW * SAMPLING_HZ), dtype=np.int64)
+    heard = recordings(np.full(MANY, EXPECTED), 40.0)
+    compared = () if quick else ("catseye", "scipy.signal.correlate, parabola")
+    note = "; ".join(f"{name}: {accuracy(forms[name], lambda snr: float(compiled.bound(snr)))}" for name in compared)
+    yield raced(
+        "delay of a pulse",
+        f"{len(TIME)} samples, one recording a call",
+        {name: Contender(lambda form=form: form(heard[0])) for name, form in forms.items()}  # type: ignore[misc]
+        | {LIMIT: Contender(lambda: limits.read(words))},
+        quick=quick,
+        clock=time.process_time,
+        note=note,
+    )
+    yield raced(
+        "delay of a pulse",
+        f"{MANY} recordings a call",
+        {
+            name: Contender(
+                lambda form=form, count=count: form(heard[:count]),  # type: ignore[misc]
+                count / MANY,
+            )
+            for name, form in forms.items()
+            for count in [MANY if name.startswith("catseye") else FEW]
+        },
+        quick=quick,
+        clock=time.process_time,
+    )
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from harness import Contender, Row, main, missing, raced
 
 from catseye.estimation.design.addition import with_ranger
 from catseye.estimation.design.criteria import WorstAxis
@@ -25,6 +24,7 @@ from catseye.reduction.design.objective import DesignObjective
 from catseye.reduction.design.regions import Constraints, moving_units
 from catseye.reduction.design.scene import DesignScene, scene_of_layout, scene_of_site
 from catseye.reduction.design.vary import variations
+from harness import Contender, Row, main, missing, raced
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 TIMED = 16  # differences of the large structure

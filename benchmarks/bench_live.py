@@ -1,21 +1,20 @@
-"""A coordinator of 18 streaming rangers: its share of a core, the time from a buffer to its durable acknowledgement.
+"""A coordinator of 18 streaming rangers: its processor time a shot, and the time from a buffer to its durable entry.
 
-python benchmarks/bench_live.py [--seconds 30] [--rangers 18] [--heads fast|twin] [--postgresql URL] [--json]
+python benchmarks/bench_live.py [--quick]
 python benchmarks/bench_live.py --seconds 600 --series FILE.csv
 python benchmarks/bench_live.py --only-dark --dark 1000 --heads twin
+python benchmarks/bench_live.py --postgresql URL    the journal in an empty database
 
 The rangers are the twin's, in a process of their own, on sockets; 128 ms buffers back to back. `fast`: their heads have
 the buffers ready (returns of the twin's truth), so that the generator does not take the second core; `twin`: the
 twin's own heads. This process is the coordinator with all it has: links, guard, reduction, an epoch each 10 s, journal
-with buffers, its own port; its share of a core is that of the process, all threads. Time counts from the end of a
-buffer, by its stamp (in steps of 0.9 ms), until the entry is told as durable. Lost: fired, by the heads' own count,
+with buffers, its own port; its processor time is that of the process, all threads. Time counts from the end of a
+buffer, by its stamp (in steps of 0.9 ms), until the entry is reported as durable. Lost: fired, by the heads' own count,
 and not in the journal.
 
 Beside it what a user would write instead, on the same rangers: asyncio streams, a phase of each buffer, and sqlite3
-with a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs.
-
-First it times dark orders: all rangers fire for one connection, and another says PS 0 to one after the other, each
-second time behind a packet of long questions; the time from the order to its answer, by which the laser is off.
+with a commit a shot, samples as JSON or as bytes; no reduction, no guard, no epochs. Where the disk is slow it falls
+behind, and its delay grows as long as it runs. The limits: base64 and a copy of a buffer; a flush of it to the disk.
 
 `--series` measures catseye alone, and the machine beside it: five times a second a buffer is written and flushed to the
 same disk, and each second the kernel is asked how much of both cores' time a virtual machine's host gave to others.
@@ -33,8 +32,9 @@ import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -42,54 +42,75 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+import limits
 from catseye.coordinator.journal.entries import AnsweredShot
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.records.site.folder import REFERENCE
 from catseye.service.coordinator import LiveCoordinator, Orders, Peers
+from dark import COMMANDING, LIMIT_MS, DarkResult, dark_orders
+from harness import Row, main, spread
 from load_scene import LoadChild, load_site, lost_and_doubled
 
 TICK = 864e-6  # s
-LONGEST_START, SETTLED, DRAINED = 60.0, 14.0, 2.0  # s
-PEER_SECONDS = 10.0
-COMMANDING = ("LEASE peer", "AXIS 0, 1", "AXIS 1, 1", "PS 1", "CIL 0", "STM 0, 1000000")  # who fires by hand
-DARK_LIMIT_MS = 100.0
-LISTINGS = 8  # long answers that a dark order stands behind, each second time
-RENEWED = 5.0  # s
+LONGEST_START, SETTLED, DRAINED, LONGEST_END = 60.0, 14.0, 2.0, 30.0  # s
+RANGERS = 18
+SECONDS, QUICK_SECONDS, PEER_SECONDS, PEER_SETTLED = 20.0, 10.0, 8.0, 3.0
+SEGMENTS = 5  # of a measurement, for its spread
+DARK_TRIES = 90
 BUFFER_BYTES = 16_384
 
 
 @dataclass(frozen=True)
-class Result:
-    """Of one run: shots a second a ranger; % of a core, also of the process of epochs; ms until durable."""
+class Measurement:
+    """Shots of one run.
 
-    name: str
+    late      s until durable, of each
+    cpu       processor s a shot, of each segment
+    rate      shots a second and ranger
+    solving   share of a core of the process that solves epochs
+    lost, doubled   shots, counted against what the heads fired; None where nobody counts
+    """
+
+    late: np.ndarray
+    cpu: np.ndarray
     rate: float
-    cpu_percent: float
-    ms_a_shot: float
-    p50_ms: float
-    p90_ms: float
-    p99_ms: float
-    max_ms: float
-    shots: int
+    solving: float = 0.0
     lost: int | None = None
     doubled: int | None = None
-    solving_percent: float | None = None
+
+    def percentile(self, percent: float) -> float:
+        """Delay until durable, s."""
+        return float(np.percentile(self.late, percent))
 
 
-def result(name: str, late: list[float], cpu: float, wall: float, rangers: int, **counts: int) -> Result:
-    quantiles = (float(v) * 1e3 for v in np.percentile(late, [50, 90, 99, 100]))
-    n = len(late)
-    return Result(name, n / wall / rangers, 100.0 * cpu / wall, 1e3 * cpu / n, *quantiles, n, **counts)
+class Watch:
+    """Processor time and shots of this process, segment by segment."""
+
+    def __init__(self) -> None:
+        self.late: list[tuple[float, float]] = []  # (`time.monotonic` when durable, s after its buffer's end)
+
+    def note(self, late: float) -> None:
+        """Count a shot that became durable just now."""
+        self.late.append((time.monotonic(), late))
+
+    async def measure(self, seconds: float, rangers: int, segments: int = SEGMENTS) -> Measurement:
+        """Wait so long and measure what happens meanwhile."""
+        self.late.clear()
+        costs, begun = [], time.perf_counter()
+        for _ in range(segments):
+            cpu, count = time.process_time(), len(self.late)
+            await asyncio.sleep(seconds / segments)
+            costs.append((time.process_time() - cpu) / max(len(self.late) - count, 1))
+        wall, late = time.perf_counter() - begun, np.array([late for _, late in self.late])
+        if not len(late):
+            raise SystemExit(f"no shot became durable in {seconds:g} s")
+        return Measurement(late, np.array(costs), len(late) / wall / rangers)
 
 
 async def coordinated(
-    child: LoadChild, site: Any, journal: str, name: str, seconds: float, told: list[tuple[float, float]] | None = None
-) -> Result:
-    """The coordinator; first a round that gives each ranger a reference and a target, then streams.
-
-    told   is filled with when each shot was durable (`time.monotonic`) and how many s after its buffer's end
-    """
-    told = [] if told is None else told
+    child: LoadChild, site: Any, journal: str, seconds: float, watch: Watch, *, segments: int = SEGMENTS
+) -> Measurement:
+    """The coordinator; first a round that gives each ranger a reference and a target, then streams."""
     targets: dict[str, str] = {}
     before = child.report()["fired"]
     running = LiveCoordinator(
@@ -99,7 +120,7 @@ async def coordinated(
     def entry(entry: Any) -> None:
         if isinstance(entry, AnsweredShot):
             shot = entry.shot
-            told.append((time.monotonic(), child.clock.now_ns() * 1e-9 - shot.ticks * TICK - shot.duration))
+            watch.note(child.clock.now_ns() * 1e-9 - shot.ticks * TICK - shot.duration)
             if entry.status == "used" and shot.target != REFERENCE:
                 targets[shot.ranger] = shot.target
 
@@ -111,23 +132,23 @@ async def coordinated(
     for ranger in child.addresses:
         running.ziy.stream(ranger, targets.get(ranger, REFERENCE))
     await asyncio.sleep(SETTLED)  # the round that was planned before comes to its end
-    told.clear()
-    cpu, solving, wall = time.process_time(), solver_cpu(running), time.perf_counter()
-    await asyncio.sleep(seconds)
-    cpu, wall, measured = time.process_time() - cpu, time.perf_counter() - wall, [late for _, late in told]
-    solving = solver_cpu(running) - solving
+    solving, wall = solver_cpu(running), time.perf_counter()
+    found = await watch.measure(seconds, len(child.addresses), segments)
+    solving, wall = solver_cpu(running) - solving, time.perf_counter() - wall
     for ranger in child.addresses:
         running.ziy.stream(ranger, None)
     running.ziy.mode = "hold"  # streams under way come to their end
-    while any(link.busy for link in running.ziy.links.values()):
+    ending = time.monotonic() + LONGEST_END
+    while any(link.busy for link in running.ziy.links.values()) and time.monotonic() < ending:
         await asyncio.sleep(0.1)
     await asyncio.sleep(DRAINED)
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
     fired = {name: ticks[len(before[name]) :] for name, ticks in child.report()["fired"].items()}
     lost, doubled = lost_and_doubled(fired, JournalReader(journal))
-    found = result(name, measured, cpu, wall, len(child.addresses), lost=lost, doubled=doubled)
-    return replace(found, solving_percent=100.0 * solving / wall)
+    return Measurement(
+        late=found.late, cpu=found.cpu, rate=found.rate, solving=solving / wall, lost=lost, doubled=doubled
+    )
 
 
 def solver_cpu(running: LiveCoordinator) -> float:
@@ -136,9 +157,13 @@ def solver_cpu(running: LiveCoordinator) -> float:
     return (int(used[11]) + int(used[12])) / os.sysconf("SC_CLK_TCK")
 
 
-async def by_hand(child: LoadChild, path: Path, name: str, seconds: float, *, as_json: bool) -> Result:
-    """What a user would write: a task a ranger, a commit a shot."""
-    late: list[float] = []
+async def by_hand(child: LoadChild, path: Path, seconds: float, *, as_json: bool) -> Measurement:
+    """What a user would write: a task a ranger, a commit a shot.
+
+    A task that finds lines in its buffer never waits, so after each shot it lets the others run: or a disk slower than
+    the rangers would keep this program from its clock, and the measurement from its end.
+    """
+    watch = Watch()
     turn = np.exp(1j * 2.0 * np.pi * np.arange(BUFFER_BYTES // 2) / 64) * 2.0 / (BUFFER_BYTES // 2)
     with closing(sqlite3.connect(path)) as database:
         database.execute("CREATE TABLE shots (ranger TEXT, stamp TEXT, amplitude REAL, phase REAL, samples)")
@@ -154,179 +179,101 @@ async def by_hand(child: LoadChild, path: Path, name: str, seconds: float, *, as
                         continue
                     _, _, cycles, _, hertz, volts, _, text = body.split(", ")
                     samples = np.frombuffer(base64.b64decode(text), dtype="<i2")
-                    found = complex(turn @ samples) * float(volts)
-                    kept = json.dumps(samples.tolist()) if as_json else samples.tobytes()
-                    row = (ranger, stamp, abs(found), float(np.angle(found)), kept)
+                    phasor = complex(turn @ samples) * float(volts)
+                    stored = json.dumps(samples.tolist()) if as_json else samples.tobytes()
+                    row = (ranger, stamp, abs(phasor), float(np.angle(phasor)), stored)
                     database.execute("INSERT INTO shots VALUES (?, ?, ?, ?, ?)", row)
                     database.commit()
                     day, rest = stamp.split(".")
                     ticks = int(day) * 10**8 + int(rest)
-                    late.append(child.clock.now_ns() * 1e-9 - ticks * TICK - int(cycles) / int(hertz))
+                    watch.note(child.clock.now_ns() * 1e-9 - ticks * TICK - int(cycles) / int(hertz))
+                    await asyncio.sleep(0)
             finally:
                 writer.close()
 
         tasks = [asyncio.create_task(listen(ranger)) for ranger in child.addresses]
-        await asyncio.sleep(3.0)
-        late.clear()
-        cpu, wall = time.process_time(), time.perf_counter()
-        await asyncio.sleep(seconds)
-        cpu, wall, measured = time.process_time() - cpu, time.perf_counter() - wall, list(late)
+        await asyncio.sleep(PEER_SETTLED)
+        found = await watch.measure(seconds, len(child.addresses))
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-    return result(name, measured, cpu, wall, len(child.addresses))
+    return found
 
 
-@dataclass(frozen=True)
-class DarkResult:
-    """Dark orders to rangers that all fire: count, ms until answered, % within the limit."""
-
-    tries: int
-    p50_ms: float
-    p99_ms: float
-    max_ms: float
-    within_percent: float
-    load: float
+# --- rows
 
 
-class FiringRanger:
-    """A ranger that one connection has fire without end, and another makes dark."""
-
-    def __init__(self, at: Any):
-        self._at, self._token, self.heard = at, "", asyncio.Queue[str]()
-        self._tasks: list[asyncio.Task[None]] = []
-
-    async def start(self) -> None:
-        host, ports = self._at.host, self._at.ports
-        self._holder = await asyncio.open_connection(host, ports[0], limit=2**20)
-        self._other = await asyncio.open_connection(host, ports[1], limit=2**20)
-        self._say(self._holder, *COMMANDING)
-        self._tasks = [asyncio.create_task(each) for each in (self._hold(), self._renew(), self._listen())]
-        await self.until("CMEAS 1")
-
-    async def stop(self) -> None:
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        for _, writer in (self._holder, self._other):
-            writer.close()
-
-    async def darkened(self, tid: int, *, behind: int, pause: float) -> float:
-        """s from a PS 0, behind so many listings, to its answer; then it fires again.
-
-        pause   s, from a measurement to the order
-        """
-        await self.until("CMEAS 1")
-        await asyncio.sleep(pause)
-        began = time.perf_counter()
-        self._say(self._other, *["COO"] * behind, f"{tid}\tPS 0")
-        await self.until("PS 1, 0", tid)
-        took = time.perf_counter() - began
-        await self.until("CMEAS 0", fresh=False)  # the stream is over, and a new one may begin
-        self._say(self._other, "UNLATCH bench")
-        await self.until("LATCH 1, none")
-        self._say(self._holder, "PS 1", "STM 0, 1000000")
-        return took
-
-    async def until(self, words: str, tid: int | None = None, *, fresh: bool = True) -> None:
-        """Wait for a line; a fresh one was not there before."""
-        while fresh and not self.heard.empty():
-            self.heard.get_nowait()
-        while True:
-            head, _, body = (await self.heard.get()).rpartition("\t")
-            if body.startswith(words) and (tid is None or head.startswith(f"{tid}\t")):
-                return
-
-    def _say(self, connection: Any, *lines: str) -> None:
-        connection[1].write("".join(f"{line}\n" for line in lines).encode())
-
-    async def _hold(self) -> None:
-        while line := await self._holder[0].readline():
-            if b"\tLEASE 1, peer" in line and not self._token:
-                self._token = line.decode().rsplit(", ", 1)[1].strip()
-
-    async def _renew(self) -> None:
-        while True:
-            await asyncio.sleep(RENEWED)
-            self._say(self._holder, f"LEASE peer, {self._token}")
-
-    async def _listen(self) -> None:
-        while line := await self._other[0].readline():
-            self.heard.put_nowait(line.decode("ascii").rstrip())
+def rows(quick: bool) -> Iterator[Row]:
+    """Processor time a shot; in a whole run the delay until durable and dark orders, too."""
+    with tempfile.TemporaryDirectory() as name:
+        yield from asyncio.run(measured(Path(name), quick=quick))
 
 
-async def dark_orders(child: LoadChild, tries: int) -> DarkResult:
-    """Time until rangers that all fire are dark, one after another."""
-    rangers = [FiringRanger(at) for at in child.addresses.values()]
-    late: list[float] = []
-    rng = np.random.default_rng(40)
-    try:
-        await asyncio.gather(*(ranger.start() for ranger in rangers))
-        for k in range(tries):
-            ranger = rangers[k % len(rangers)]
-            behind = LISTINGS * (k // len(rangers) % 2)
-            late.append(1e3 * await ranger.darkened(1000 + k, behind=behind, pause=rng.uniform(0.0, 0.128)))
-    finally:
-        await asyncio.gather(*(ranger.stop() for ranger in rangers))
-    p50, p99, most = (float(v) for v in np.percentile(late, [50, 99, 100]))
-    within = 100.0 * float(np.mean(np.array(late) <= DARK_LIMIT_MS))
-    return DarkResult(tries, p50, p99, most, within, os.getloadavg()[0])
+async def measured(folder: Path, *, quick: bool) -> list[Row]:
+    """Rows of one set of rangers: dark orders first, then ours, then by hand."""
+    seconds = QUICK_SECONDS if quick else SECONDS
+    with LoadChild(RANGERS) as child:
+        dark = None if quick else await dark_orders(child, DARK_TRIES)
+        ours = await coordinated(child, load_site(RANGERS), str(folder / "night.db"), seconds, Watch())
+        peers = {
+            f"asyncio and sqlite3, {kind}, no reduction": await by_hand(
+                child, folder / f"{kind}.db", PEER_SECONDS, as_json=kind == "JSON"
+            )
+            for kind in ("JSON", "bytes")
+        }
+    return [*shot_rows(ours, peers, folder, quick=quick), *([] if dark is None else [dark_row(dark)])]
 
 
-def machine(folder: Path) -> dict[str, float]:
-    """What no program here can be faster than: a flush of one buffer to the disk, copying it, its base64."""
+def shot_rows(ours: Measurement, peers: dict[str, Measurement], folder: Path, *, quick: bool) -> Iterator[Row]:
+    """Rows of what a shot costs, and of how late it is durable."""
     raw = os.urandom(BUFFER_BYTES)
     text = base64.b64encode(raw)
-    spent = []
-    with (folder / "flushed").open("wb", buffering=0) as file:
-        for _ in range(200):
-            file.write(raw)
-            began = time.perf_counter()
-            os.fsync(file.fileno())
-            spent.append(time.perf_counter() - began)
-    taken = {}
-    for name, job in (("copy_us", lambda: bytearray(raw)), ("base64_us", lambda: base64.b64decode(text))):
-        best = float("inf")
-        for _ in range(20):
-            began = time.perf_counter()
-            for _ in range(50):
-                job()
-            best = min(best, (time.perf_counter() - began) / 50)
-        taken[name] = best * 1e6
-    return {
-        "flush_p50_ms": float(np.median(spent)) * 1e3,
-        "flush_p99_ms": float(np.percentile(spent, 99)) * 1e3,
-        **taken,
-    }
-
-
-async def measured(options: argparse.Namespace, folder: Path) -> tuple[list[Result], DarkResult]:
-    site = load_site(options.rangers)
-    found = []
-    with LoadChild(options.rangers, twin=options.heads == "twin") as child:
-        dark = await dark_orders(child, options.dark)
-        places = [("catseye, SQLite", str(folder / "night.db"))]
-        if options.postgresql:
-            places.append(("catseye, PostgreSQL", options.postgresql))
-        for name, place in places:
-            found.append(await coordinated(child, site, place, name, options.seconds))
-        for name, as_json in (("asyncio, JSON, a commit each", True), ("asyncio, bytes, a commit each", False)):
-            path = folder / f"{len(found)}.db"
-            found.append(await by_hand(child, path, name, min(options.seconds, PEER_SECONDS), as_json=as_json))
-    return found, dark
-
-
-async def darkness(options: argparse.Namespace) -> DarkResult:
-    with LoadChild(options.rangers, twin=options.heads == "twin") as child:
-        return await dark_orders(child, options.dark)
-
-
-def tell_dark(dark: DarkResult, rangers: int) -> None:
-    sys.stdout.write(
-        f"dark orders: {dark.tries} to {rangers} rangers that fire, answered in p50 {dark.p50_ms:.1f} ms, p99 "
-        f"{dark.p99_ms:.1f}, most {dark.max_ms:.1f}; {dark.within_percent:.1f} % within {DARK_LIMIT_MS:g} ms; load of "
-        f"the machine {dark.load:.1f}\n"
+    least = limits.median_seconds(lambda: [bytearray(base64.b64decode(text)) for _ in range(100)]) / 100
+    what = f"{RANGERS} rangers, journal with samples"
+    share = 100.0 * ours.rate * RANGERS * float(np.median(ours.cpu))
+    yield Row(
+        path="living site, processor time of a shot",
+        what=what,
+        ours_s=float(np.median(ours.cpu)),
+        beside={name: float(np.median(peer.cpu)) for name, peer in peers.items()},
+        limit_s=least,
+        spread=spread(ours.cpu),
+        note=f"{ours.rate:.2f} buffers a second of each ranger, {share:.0f} % "
+        f"of a core, epochs {100 * ours.solving:.0f} % of another; the alternatives took "
+        + " and ".join(f"{peer.rate:.2f}" for peer in peers.values())
+        + " buffers a second",
     )
+    if quick:
+        return
+    parts = np.array([np.median(part) for part in np.array_split(ours.late, SEGMENTS)])
+    yield Row(
+        path="living site, buffer to durable",
+        what=what,
+        ours_s=ours.percentile(50),
+        beside={name: peer.percentile(50) for name, peer in peers.items()},
+        limit_s=limits.flush(folder),
+        spread=spread(parts),
+        note=f"99 of 100 within {1e3 * ours.percentile(99):.1f} ms, the latest {1e3 * ours.percentile(100):.0f} ms; "
+        f"{ours.lost} lost, {ours.doubled} doubled; the alternatives' 99 within "
+        + " and ".join(f"{1e3 * peer.percentile(99):.0f} ms" for peer in peers.values()),
+    )
+
+
+def dark_row(dark: DarkResult) -> Row:
+    """Row of dark orders."""
+    return Row(
+        path="living site, dark order to laser off",
+        what=f"{dark.tries} orders to {RANGERS} rangers that fire",
+        ours_s=dark.p50_ms * 1e-3,
+        beside={},
+        limit_s=None,
+        spread=dark.spread,
+        note=f"99 of 100 within {dark.p99_ms:.1f} ms, the latest {dark.max_ms:.1f} ms; {dark.within_percent:.1f} % "
+        f"within {LIMIT_MS:g} ms",
+    )
+
+
+# --- long series, dark orders alone, PostgreSQL
 
 
 class Machine(threading.Thread):
@@ -364,99 +311,76 @@ def stolen_ms() -> float:
         return 1e3 * int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")
 
 
-async def series(options: argparse.Namespace, folder: Path) -> Result:
+async def series(options: argparse.Namespace, folder: Path) -> None:
     """A long run, shot by shot, into a table."""
-    told: list[tuple[float, float]] = []
-    machine = Machine(folder / "flushed")
+    watch, recording = Watch(), Machine(folder / "flushed")
     with LoadChild(options.rangers, twin=options.heads == "twin") as child:
-        machine.start()
-        place, name = str(folder / "night.db"), "catseye, SQLite"
-        found = await coordinated(child, load_site(options.rangers), place, name, options.seconds, told)
-        machine.stop()
-    began, ended = told[0][0], told[found.shots - 1][0]
-    rows = [("shot", at, 1e3 * late) for at, late in told[: found.shots]]
-    rows += [row for row in machine.rows if began <= row[1] <= ended]
-    text = "kind,s,ms\n" + "".join(f"{kind},{at - began:.3f},{ms:.3f}\n" for kind, at, ms in rows)
+        recording.start()
+        site = load_site(options.rangers)
+        found = await coordinated(child, site, str(folder / "night.db"), options.seconds, watch)
+        recording.stop()
+    shots = watch.late[: len(found.late)]
+    began, ended = shots[0][0], shots[-1][0]
+    table = [("shot", at, 1e3 * late) for at, late in shots]
+    table += [row for row in recording.rows if began <= row[1] <= ended]
+    text = "kind,s,ms\n" + "".join(f"{kind},{at - began:.3f},{ms:.3f}\n" for kind, at, ms in table)
     options.series.write_text(text, encoding="utf-8")
-    flushes = [ms for kind, _, ms in rows if kind == "flush"]
-    stolen = [ms for kind, _, ms in rows if kind == "stolen"]
+    flushes, stolen = ([ms for kind, _, ms in table if kind == name] for name in ("flush", "stolen"))
     p99 = float(np.percentile(flushes, 99))
     sys.stdout.write(
-        f"{found.shots} shots in {options.seconds:g} s: p50 {found.p50_ms:.1f} ms, p99 {found.p99_ms:.1f}, most "
-        f"{found.max_ms:.1f}; lost {found.lost}, doubled {found.doubled}; a flush p50 "
-        f"{np.median(flushes):.1f} ms, p99 {p99:.1f}; limit max(20, 3 x {p99:.1f}) ms; stolen {np.mean(stolen):.0f} ms "
-        f"a second, {np.max(stolen):.0f} in the worst\n"
+        f"{len(shots)} shots in {options.seconds:g} s: p50 {1e3 * found.percentile(50):.1f} ms, p99 "
+        f"{1e3 * found.percentile(99):.1f}, most {1e3 * found.percentile(100):.1f}; lost {found.lost}, doubled "
+        f"{found.doubled}; a flush p50 {np.median(flushes):.1f} ms, p99 {p99:.1f}; limit max(20, 3 x {p99:.1f}) ms; "
+        f"stolen {np.mean(stolen):.0f} ms a second, {np.max(stolen):.0f} in the worst\n"
     )
-    return found
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+async def darkness(options: argparse.Namespace) -> None:
+    """Dark orders alone."""
+    with LoadChild(options.rangers, twin=options.heads == "twin") as child:
+        dark = await dark_orders(child, options.dark)
+    sys.stdout.write(
+        f"dark orders: {dark.tries} to {options.rangers} rangers that fire, answered in p50 {dark.p50_ms:.1f} ms, p99 "
+        f"{dark.p99_ms:.1f}, most {dark.max_ms:.1f}; {dark.within_percent:.1f} % within {LIMIT_MS:g} ms; load of the "
+        f"machine {dark.load:.1f}\n"
+    )
+
+
+async def postgresql(options: argparse.Namespace) -> None:
+    """The coordinator with its journal in a database."""
+    with LoadChild(options.rangers, twin=options.heads == "twin") as child:
+        found = await coordinated(child, load_site(options.rangers), options.postgresql, options.seconds, Watch())
+    sys.stdout.write(
+        f"PostgreSQL: {found.rate:.2f} shots/s a ranger, {1e3 * np.median(found.cpu):.2f} ms of a core a shot, durable "
+        f"p50 {1e3 * found.percentile(50):.1f} ms, p99 {1e3 * found.percentile(99):.1f}; lost {found.lost}, doubled "
+        f"{found.doubled}\n"
+    )
+
+
+def special() -> bool:
+    """Whether one of the long measurements was asked for, and done."""
+    parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seconds", type=float, default=30.0)
-    parser.add_argument("--rangers", type=int, default=18)
+    parser.add_argument("--rangers", type=int, default=RANGERS)
     parser.add_argument("--heads", choices=("fast", "twin"), default="fast")
     parser.add_argument("--postgresql", metavar="URL", help="an empty database")
     parser.add_argument("--folder", type=Path, help="where the journals are written and removed again")
-    parser.add_argument("--json", action="store_true")
     parser.add_argument("--series", type=Path, metavar="FILE.csv", help="a row for each shot, flush and second")
     parser.add_argument("--dark", type=int, default=200, help="dark orders that are timed")
     parser.add_argument("--only-dark", action="store_true", help="nothing else")
-    options = parser.parse_args()
-    if options.only_dark:
-        tell_dark(asyncio.run(darkness(options)), options.rangers)
-        return
+    options, _ = parser.parse_known_args()
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
-        folder = Path(name)
-        if options.series:
-            asyncio.run(series(options, folder))
-            return
-        found, dark = asyncio.run(measured(options, folder))
-        limits = machine(folder)
-    load = os.getloadavg()[0]
-    if options.json:
-        sys.stdout.write(
-            json.dumps(
-                {"results": [asdict(each) for each in found], "dark": asdict(dark), "machine": limits, "load": load}
-            )
-            + "\n"
-        )
-        return
-    ours = found[0]
-    sys.stdout.write(
-        f"{options.rangers} rangers, {options.heads} heads, {options.seconds:g} s; load of the machine {load:.1f}\n"
-    )
-    head = (
-        "shots/s",
-        "% of a core",
-        "epochs %",
-        "ms a shot",
-        "ratio",
-        "p50 ms",
-        "p90",
-        "p99",
-        "max",
-        "lost",
-        "doubled",
-    )
-    sys.stdout.write(f"{'':<32}" + "".join(f"{each:>12}" for each in head) + "\n")
-    for r in found:
-        solving = "" if r.solving_percent is None else f"{r.solving_percent:.1f}"
-        row = [
-            f"{r.rate:.2f}",
-            f"{r.cpu_percent:.1f}",
-            solving,
-            f"{r.ms_a_shot:.2f}",
-            f"{r.ms_a_shot / ours.ms_a_shot:.1f} x",
-        ]
-        row += [f"{v:.1f}" for v in (r.p50_ms, r.p90_ms, r.p99_ms, r.max_ms)]
-        row += ["" if v is None else str(v) for v in (r.lost, r.doubled)]
-        sys.stdout.write(f"  {r.name:<30}" + "".join(f"{each:>12}" for each in row) + "\n")
-    tell_dark(dark, options.rangers)
-    sys.stdout.write(
-        f"machine: a flush of {BUFFER_BYTES} bytes {limits['flush_p50_ms']:.1f} ms (99th percentile "
-        f"{limits['flush_p99_ms']:.1f}), a copy {limits['copy_us']:.1f} us, base64 {limits['base64_us']:.0f} us\n"
-    )
+        if options.only_dark:
+            asyncio.run(darkness(options))
+        elif options.series:
+            asyncio.run(series(options, Path(name)))
+        elif options.postgresql:
+            asyncio.run(postgresql(options))
+        else:
+            return False
+    return True
 
 
 if __name__ == "__main__":
-    main()
+    if not special():
+        main(rows)

@@ -1,27 +1,20 @@
-"""Free ranging networks by block elimination, beside what a user would pick instead; medians of interleaved rounds.
+"""Free ranging networks by block elimination, beside what a user would pick instead.
 
-python benchmarks/bench_network.py [--peers PYTHON] [--long]
-
---peers   a Python that has gtsam, where this one has not
---long    scipy and gtsam on the large network too: minutes
+python benchmarks/bench_network.py [--quick] [--curves]
 
 All start from the same coordinates, 1 cm off, and stop at their own criterion, set so tight that the predicted ranges
-agree with ours to the printed share of a sigma; what a motion of the whole network does not change, all may choose.
+agree with ours to the share of a sigma in the note; what a motion of the whole network does not change, all may choose.
 Ours counts everything from the arrays of the network to the answer; Ceres its Solve alone, the problem being built;
-gtsam its optimiser, the graph being built. One thread each.
+gtsam its optimiser, the graph being built. One thread each. The C++ Ceres is compiled where g++ finds its headers and
+libraries (CPLUS_INCLUDE_PATH, LIBRARY_PATH, LD_LIBRARY_PATH). The limit is the multiply-adds of the elimination, 15 for
+each pair of stations and target, in the two eliminations that Gauss-Newton needs at least from such a start.
 """
 
-import argparse
-import importlib.util
-import json
-import os
-import resource
-import statistics
+import functools
 import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,22 +23,21 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_array
 from threadpoolctl import threadpool_limits
 
+import limits
+from catseye.estimation.least_squares.adjustment import COMPLETE
 from catseye.estimation.network.multilateration.gauss_newton import adjust_ranges
 from catseye.estimation.network.multilateration.network import RangingNetwork
 from catseye.estimation.network.multilateration.terms import PointPriors
+from harness import LIMIT, Contender, Curve, Row, main, missing, raced
 
 HERE = Path(__file__).parent
-SMALL, LARGE = (18, 2209), (40, 20_000)
-ROUNDS = {SMALL: 9, LARGE: 5}
-SLOW_ROUNDS = 3  # of peers that take a second and more
-GOALS = {  # issue 3: how many times our time each peer's must at least be
-    (SMALL, "solve", "Ceres"): 18,
-    (SMALL, "solve", "scipy"): 80,
-    (SMALL, "solve", "gtsam"): 100,
-    (SMALL, "all", "Ceres"): 13,
-    (LARGE, "solve", "Ceres"): 40,
-    (LARGE, "all", "Ceres"): 25,
-}
+SMALL, LARGE, HUGE = (18, 2209), (40, 20_000), (60, 100_000)
+GROWING = (100, 300, 1000, 3000, 10_000, 30_000)  # targets of 18 stations
+PAIR_COST, ELIMINATIONS = 15, 2  # multiply-adds of a pair of stations and a target; matrices built
+Solver = Callable[[], tuple[float, np.ndarray]]
+WANTING = "no C++ compiler with its headers and libraries was found"
+QUICKLY = "not in quick mode"
+NO_LIBRARY = 127  # status of a program whose libraries are not found
 
 
 def network(size: tuple[int, int], seen: float = 1.0) -> RangingNetwork:
@@ -73,21 +65,25 @@ def predicted(stations: np.ndarray, targets: np.ndarray, net: RangingNetwork) ->
     return np.linalg.norm(targets[net.target] - stations[net.station], axis=1)
 
 
-# --- the peers: each yields seconds a round, then its answer
+# --- the alternatives: each call answers with its seconds and its predicted distances
 
 
+@functools.cache
 def build_ceres(folder: Path) -> Path | None:
-    """The driver beside this file, compiled; None where Ceres or a compiler is missing."""
+    """The driver beside this file, compiled; None where Ceres, its libraries or a compiler are missing."""
     program = folder / "ceres_network"
     command = ["g++", "-std=c++17", "-O3", "-march=native", "-I/usr/include/eigen3", str(HERE / "ceres_network.cpp")]
     try:
         done = subprocess.run([*command, "-o", str(program), "-lceres", "-lglog"], capture_output=True, check=False)
     except FileNotFoundError:
         return None
-    return program if done.returncode == 0 else None
+    if done.returncode:
+        return None
+    trial = subprocess.run([program], capture_output=True, check=False)
+    return None if trial.returncode == NO_LIBRARY else program
 
 
-def ceres(program: Path, folder: Path, net: RangingNetwork) -> Callable[[], tuple[float, np.ndarray]]:
+def ceres(program: Path, folder: Path, net: RangingNetwork) -> Solver:
     """One round of Ceres: seconds in Solve, predicted distances."""
     s, t, m = len(net.stations), len(net.targets), len(net.distance)
     problem, answer = folder / f"{s}x{t}.problem", folder / f"{s}x{t}.answer"
@@ -104,7 +100,7 @@ def ceres(program: Path, folder: Path, net: RangingNetwork) -> Callable[[], tupl
     return one
 
 
-def scipy_sparse(net: RangingNetwork) -> Callable[[], tuple[float, np.ndarray]]:
+def scipy_sparse(net: RangingNetwork) -> Solver:
     """One round of scipy's sparse least squares with analytic Jacobian (trust region, lsmr)."""
     s, m = len(net.stations), len(net.distance)
     columns = np.concatenate([net.station[:, None] * 3 + np.arange(3), (s + net.target)[:, None] * 3 + np.arange(3)], 1)
@@ -125,136 +121,116 @@ def scipy_sparse(net: RangingNetwork) -> Callable[[], tuple[float, np.ndarray]]:
         return csr_array((values, columns.ravel(), np.arange(m + 1) * 6), shape=(m, len(start)))
 
     def one() -> tuple[float, np.ndarray]:
-        began = time.perf_counter()
+        began = time.process_time()
         fit = least_squares(residual, start, jac=jacobian, method="trf", tr_solver="lsmr", ftol=1e-9, xtol=1e-12)
-        return time.perf_counter() - began, along(fit.x)[1]
+        return time.process_time() - began, along(fit.x)[1]
 
     return one
 
 
-GTSAM = """
-import sys, json, time
-import numpy as np, gtsam
-net = np.load(sys.argv[1])
-s, t = len(net["stations"]), len(net["targets"])
-graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
-noise = [gtsam.noiseModel.Isotropic.Sigma(1, x) for x in net["sigma"]]
-for i, (a, b, d) in enumerate(zip(net["station"].tolist(), net["target"].tolist(), net["distance"].tolist())):
-    graph.add(gtsam.RangeFactor3(a, s + b, d, noise[i]))
-for i, x in enumerate(np.concatenate([net["stations"], net["targets"]])):
-    start.insert(i, x)
-    if i < s:  # holds the datum so loosely that the ranges do not feel it
-        graph.add(gtsam.PriorFactorPoint3(i, x, gtsam.noiseModel.Isotropic.Sigma(3, 1.0)))
-for _ in range(int(sys.argv[3])):
-    began = time.perf_counter()
-    parameters = gtsam.LevenbergMarquardtParams()
+def gtsam(net: RangingNetwork) -> Solver:
+    """One round of gtsam's Levenberg-Marquardt; a prior of 1 m holds the datum, which the ranges do not feel."""
+    import gtsam as library
+
+    s, t = len(net.stations), len(net.targets)
+    graph, start = library.NonlinearFactorGraph(), library.Values()
+    noise = [library.noiseModel.Isotropic.Sigma(1, x) for x in net.sigma]
+    for i, (a, b, d) in enumerate(zip(net.station.tolist(), net.target.tolist(), net.distance.tolist(), strict=True)):
+        graph.add(library.RangeFactor3(a, s + b, d, noise[i]))
+    loose = library.noiseModel.Isotropic.Sigma(3, 1.0)
+    for i, x in enumerate(np.concatenate([net.stations, net.targets])):
+        start.insert(i, x)
+        if i < s:
+            graph.add(library.PriorFactorPoint3(i, x, loose))
+    parameters = library.LevenbergMarquardtParams()
     parameters.setLinearSolverType("MULTIFRONTAL_CHOLESKY")
     parameters.setRelativeErrorTol(1e-9)
-    answer = gtsam.LevenbergMarquardtOptimizer(graph, start, parameters).optimize()
-    print(json.dumps(time.perf_counter() - began), flush=True)
-np.save(sys.argv[2], np.array([answer.atPoint3(i) for i in range(s + t)]))
-"""
-
-
-def gtsam(python: str, folder: Path, net: RangingNetwork) -> Callable[[], tuple[float, np.ndarray]]:
-    """One round of gtsam in the Python that has it."""
-    s = len(net.stations)
-    fields = {k: getattr(net, k) for k in ("stations", "targets", "station", "target", "distance", "sigma")}
-    np.savez(folder / "network.npz", **fields)
 
     def one() -> tuple[float, np.ndarray]:
-        arguments = [python, "-c", GTSAM, str(folder / "network.npz"), str(folder / "answer.npy"), "1"]
-        done = subprocess.run(arguments, capture_output=True, check=True, text=True)
-        x = np.load(folder / "answer.npy")
-        return json.loads(done.stdout), predicted(x[:s], x[s:], net)
+        began = time.process_time()
+        answer = library.LevenbergMarquardtOptimizer(graph, start, parameters).optimize()
+        seconds = time.process_time() - began
+        x = np.array([answer.atPoint3(i) for i in range(s + t)])
+        return seconds, predicted(x[:s], x[s:], net)
 
     return one
 
 
-def ours(net: RangingNetwork, **options: object) -> Callable[[], tuple[float, np.ndarray]]:
-    """One round of ours."""
-
-    def one() -> tuple[float, np.ndarray]:
-        times = []
-        for _ in range(3):  # the middle one: what a program has that solves again and again
-            began = time.perf_counter()
-            solution = adjust_ranges(net, **options)  # type: ignore[arg-type]
-            times.append(time.perf_counter() - began)
-        solution.require_converged()
-        return statistics.median(times), predicted(solution.stations, solution.targets, net)
-
-    return one
+# --- the rows
 
 
-def find_gtsam(python: str | None) -> str | None:
-    """A Python that has gtsam, or None."""
-    if python is None:
-        return sys.executable if importlib.util.find_spec("gtsam") else None
-    found = subprocess.run([python, "-c", "import gtsam"], capture_output=True, check=False)
-    return python if found.returncode == 0 else None
+def ours(net: RangingNetwork, *, tests: bool, engine: str = "numba") -> Contender:
+    """Our adjustment, from arrays to answer."""
+    return Contender(
+        lambda: adjust_ranges(net, engine=engine, solver=replace(COMPLETE, tests=tests)).require_converged()
+    )
 
 
-# --- the tables
-
-
-def interleaved(
-    work: dict[str, Callable[[], tuple[float, np.ndarray]]], rounds: dict[str, int]
-) -> dict[str, tuple[float, np.ndarray]]:
-    """Median seconds of each over rounds taken in turn, the first unseen; and the last answer."""
-    times: dict[str, list[float]] = {name: [] for name in work}
-    answers = {}
-    for turn in range(max(rounds.values()) + 1):
-        for name, one in work.items():
-            if turn <= rounds[name]:
-                seconds, answers[name] = one()
-                if turn:
-                    times[name].append(seconds)
-    return {name: (statistics.median(times[name]), answers[name]) for name in work}
-
-
-def compare(size: tuple[int, int], folder: Path, program: Path | None, python: str | None, *, long: bool) -> None:
-    """Ours and the peers on one full network."""
-    net = network(size)
-    work = {"solve": ours(net, engine="numba", tests=False), "all": ours(net, engine="numba")}
-    titles = {"solve": "catseye, solve", "all": "catseye, solve with all covariances and tests"}
-    rounds = {"solve": ROUNDS[size], "all": ROUNDS[size]}
-
-    def add(name: str, title: str, one: Callable[[], tuple[float, np.ndarray]], times: int) -> None:
-        work[name], titles[name], rounds[name] = one, title, times
-
-    if size == SMALL:
-        add("plain", "catseye, plain numpy, solve", ours(net, engine="numpy", tests=False), ROUNDS[size])
-        add("plain all", "catseye, plain numpy, all", ours(net, engine="numpy"), ROUNDS[size])
-    missing = []
+def others(
+    size: tuple[int, int], net: RangingNetwork, folder: Path, *, quick: bool
+) -> tuple[dict[str, Solver], dict[str, str]]:
+    """Alternatives by name, and those that are left out with the reason."""
+    found, skipped = {}, missing("gtsam")
+    if size == HUGE:
+        return {}, dict.fromkeys(
+            ("C++ Ceres", "scipy least_squares, sparse", "gtsam"), "half a minute and more at this size"
+        )
+    program = None if quick else build_ceres(folder)
     if program is not None:
-        add("Ceres", "C++ Ceres, DENSE_SCHUR, Solve alone", ceres(program, folder, net), ROUNDS[size])
+        found["C++ Ceres, dense Schur, Solve alone"] = ceres(program, folder, net)
     else:
-        missing.append("Ceres")
-    if size == SMALL or long:
-        add("scipy", "scipy least_squares, sparse, lsmr", scipy_sparse(net), SLOW_ROUNDS)
-        if python is not None:
-            add("gtsam", "gtsam, Levenberg-Marquardt", gtsam(python, folder, net), SLOW_ROUNDS)
-        else:
-            missing.append("gtsam")
-    found = interleaved(work, rounds)
-    say(f"{size[0]} stations, {size[1]} targets, {len(net.distance)} ranges, free network")
-    best, reference = found["solve"]
-    for name, (seconds, answer) in found.items():
-        off = np.abs(answer - reference) / net.sigma
-        say(f"  {titles[name]:<48} {seconds * 1e3:10.2f} ms {seconds / best:8.1f} x   {off.max():.0e} sigma")
-    for name in missing:
-        say(f"  {name:<48} not installed")
-    for (where, mine, peer), least in GOALS.items():
-        if where == size and peer in found:
-            ratio = found[peer][0] / found[mine][0]
-            say(
-                f"  {peer} / {titles[mine]}: {ratio:.1f}, at least {least} wanted{'' if ratio >= least else ': MISSED'}"
-            )
-    say("")
+        skipped["C++ Ceres"] = QUICKLY if quick else WANTING
+    if size != SMALL:
+        return found, skipped | dict.fromkeys(("scipy least_squares, sparse", "gtsam"), "minutes at this size")
+    found["scipy least_squares, sparse, lsmr"] = scipy_sparse(net)
+    if quick:
+        skipped["gtsam"] = QUICKLY
+    elif "gtsam" not in skipped:
+        found["gtsam, Levenberg-Marquardt"] = gtsam(net)
+    return found, skipped
 
 
-def variants(size: tuple[int, int]) -> None:
-    """What incomplete visibility, zeros and scales, and priors cost beside the plain full network."""
+def least_time(net: RangingNetwork) -> Contender:
+    """The machine's limit."""
+    s, t = len(net.stations), len(net.targets)
+    work, share = limits.multiply_add_work(0.5 * s * (s + 1) * t * PAIR_COST * ELIMINATIONS)
+    return Contender(work, share)
+
+
+def compare(size: tuple[int, int], folder: Path, *, quick: bool) -> Iterator[Row]:
+    """Ours and the alternatives on one full network: solving alone, then with every statistic."""
+    net = network(size)
+    solution = adjust_ranges(net, engine="numba").require_converged()
+    reference = predicted(solution.stations, solution.targets, net)
+    solvers, skipped = others(size, net, folder, quick=quick)
+    off = max((float(np.abs((solve()[1] - reference) / net.sigma).max()) for solve in solvers.values()), default=0.0)
+    timed = {name: Contender(functools.partial(first, solve), timed=True) for name, solve in solvers.items()}
+    fast = {name: contender for name, contender in timed.items() if name.startswith("C++")}
+    bound = {LIMIT: least_time(net)}
+    what = f"{size[0]} stations, {size[1]} targets"
+    for title, tests, note in (
+        ("free network", False, f"{solution.iterations} iterations; ranges agree to {off:.0e} sigma"),
+        ("free network with covariances and tests", True, "others: solving alone"),
+    ):
+        plain = {"numpy, the same elimination": ours(net, tests=tests, engine="numpy")} if size == SMALL else {}
+        yield raced(
+            title,
+            what,
+            {"catseye": ours(net, tests=tests), **plain, **(fast if tests else timed), **bound},
+            quick=quick,
+            clock=time.process_time,
+            note=note,
+            skipped=skipped,
+        )
+
+
+def first(solve: Solver) -> float:
+    """Seconds of a solver's call."""
+    return solve()[0]
+
+
+def variants(size: tuple[int, int], *, quick: bool) -> Row:
+    """Incomplete visibility, zeros and scales, priors beside the plain full network; ratios near 1 are good."""
     net, part = network(size), network(size, 0.7)
     s, free = size[0], np.full(size[0], np.inf)
     rng = np.random.default_rng(2)
@@ -264,7 +240,6 @@ def variants(size: tuple[int, int]) -> None:
         "target_priors": PointPriors(cut, net.targets[cut], np.tile(1e-4 * np.eye(3), (len(cut), 1, 1))),
     }
     kinds = {
-        "full visibility": net,
         "70 % of the ranges": part,
         "zeros free": replace(net, zero_sigma=free),
         "zeros and scales free": replace(net, zero_sigma=free, scale_sigma=free),
@@ -272,54 +247,34 @@ def variants(size: tuple[int, int]) -> None:
         "priors of all stations and half the targets": replace(net, **priors),
         "datum of all points": replace(net, datum_targets=np.ones((size[1], 3), dtype=bool)),
     }
-    work = {}
-    for name, one in kinds.items():
-        work[name] = ours(one, engine="numba", tests=False)
-        work[name + ", all"] = ours(one, engine="numba")
-    found = interleaved(work, dict.fromkeys(work, ROUNDS[size]))
-    say(f"{size[0]} stations, {size[1]} targets: variants, solve and solve with all covariances and tests")
-    base, base_all = found["full visibility"][0], found["full visibility, all"][0]
-    for name in kinds:
-        a, b = found[name][0], found[name + ", all"][0]
-        say(f"  {name:<48} {a * 1e3:8.2f} ms {a / base:5.2f} x {b * 1e3:10.2f} ms {b / base_all:5.2f} x")
-    say("")
-
-
-def memory() -> None:
-    """Peak resident memory of the large network with all statistics, in a process of its own."""
-    done = subprocess.run([sys.executable, __file__, "--peak"], capture_output=True, check=True, text=True)
-    say(
-        f"Peak memory, {LARGE[0]} x {LARGE[1]} with all statistics: {int(done.stdout) / 1024:.0f} MB, below 1000 wanted"
+    return raced(
+        "variants of the free network",
+        f"{size[0]} stations, {size[1]} targets, all statistics",
+        {"catseye": ours(net, tests=True), **{f"ours, {name}": ours(one, tests=True) for name, one in kinds.items()}},
+        quick=quick,
+        clock=time.process_time,
+        note="our own variants, smaller is better",
     )
 
 
-def say(line: str) -> None:
-    """A line of the table."""
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
+def rows(quick: bool) -> Iterator[Row]:
+    """Three sizes, two in quick mode; then variants of the smallest."""
+    with tempfile.TemporaryDirectory() as name:
+        for size in (SMALL, LARGE) if quick else (SMALL, LARGE, HUGE):
+            yield from compare(size, Path(name), quick=quick)
+    if not quick:
+        yield variants(SMALL, quick=quick)
 
 
-def main() -> None:
-    """All tables."""
-    options = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    options.add_argument("--peers")
-    options.add_argument("--long", action="store_true")
-    options.add_argument("--peak", action="store_true", help=argparse.SUPPRESS)
-    given = options.parse_args()
-    if given.peak:
-        adjust_ranges(network(LARGE), engine="numba").require_converged()
-        sys.stdout.write(str(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
-        return
-    os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")  # the peers' processes
-    python = find_gtsam(given.peers)
-    with tempfile.TemporaryDirectory() as name, threadpool_limits(limits=1):
-        program = build_ceres(Path(name))
-        for size in (SMALL, LARGE):
-            compare(size, Path(name), program, python, long=given.long)
-        for size in (SMALL, LARGE):
-            variants(size)
-    memory()
+def curves(quick: bool) -> Iterator[Curve]:
+    """Seconds against targets, all statistics included."""
+    with threadpool_limits(limits=1):
+        seconds = [
+            limits.median_seconds(ours(network((18, targets)), tests=True).work, 3 if quick else 7)
+            for targets in GROWING
+        ]
+    yield Curve("free network with covariances and tests", "18 stations", "targets", GROWING, tuple(seconds))
 
 
 if __name__ == "__main__":
-    main()
+    main(rows, curves)

@@ -1,34 +1,22 @@
-"""200 MB of 16-bit samples to phase and amplitude, beside what a user would write; medians of interleaved rounds.
+"""200 MB of 16-bit samples to phase and amplitude, beside what a user would write.
 
-python benchmarks/bench_phase.py
+python benchmarks/bench_phase.py [--quick]
 
-The limit is a compiled sum of the same memory as 64-bit words. The others work on a part of it and count by the byte.
+The limit is one compiled read of the same memory. The others work on a part of it and count by the byte.
 """
 
-import statistics
-import sys
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 
 import numpy as np
-from numba import njit
 from scipy.signal import butter, sosfiltfilt
-from threadpoolctl import threadpool_limits
 
+import limits
 from catseye.signal.detection.channels import ChannelStream, interleaved_phasors
 from catseye.signal.detection.phase import detect, phasors
+from harness import LIMIT, Contender, Row, main, raced
 
-ROUNDS = 7
 BYTES, CYCLES, VOLTS = 200_000_000, 128, 10 / 32768
-TARGETS = {64: (0.7, 20, 100), 16: (0.45, 12, 60)}  # samples a cycle: of the limit, times rfft, times lock-in
-
-
-@njit(error_model="numpy", fastmath=True)
-def _read(words: np.ndarray) -> int:
-    total = 0
-    for i in range(len(words)):
-        total += words[i]
-    return total
 
 
 def samples(n: int) -> np.ndarray:
@@ -54,6 +42,12 @@ def naive(codes: np.ndarray, n: int) -> np.ndarray:
     return (2 / codes.shape[1]) * (a + 1j * b)
 
 
+def folded(codes: np.ndarray, n: int) -> np.ndarray:
+    """Sums of eq. 5.1 and 5.2 after the cycles were added up as integers."""
+    cycle = codes.reshape(len(codes), -1, n).sum(axis=1, dtype=np.int32)
+    return cycle @ np.exp(2j * np.pi * np.arange(n) / n) * (2 * VOLTS / codes.shape[1])
+
+
 def transformed(codes: np.ndarray, n: int) -> np.ndarray:
     """The bin of numpy's FFT."""
     return np.fft.rfft(codes, axis=1)[:, CYCLES].conj() * (2 * VOLTS / codes.shape[1])
@@ -69,70 +63,68 @@ def lock_in(codes: np.ndarray, n: int) -> np.ndarray:
     return 2.0 * (re.mean(axis=1) + 1j * im.mean(axis=1))
 
 
-def race(contenders: dict[str, tuple[Callable[[], object], float]]) -> dict[str, float]:
-    """GB/s of each, the median of rounds in which every one has its turn."""
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    for work, _ in contenders.values():
-        work()  # compiled, loaded, memory touched
-    for _ in range(ROUNDS):
-        for name, (work, _) in contenders.items():
-            start = time.perf_counter()
-            work()
-            times[name].append(time.perf_counter() - start)
-    return {name: 1e-9 * size / statistics.median(times[name]) for name, (_, size) in contenders.items()}
+ALTERNATIVES = {
+    "numpy, cycles folded as integers": folded,
+    "numpy rfft": transformed,
+    "numpy, sums as written": naive,
+    "scipy lock-in (sosfiltfilt)": lock_in,
+}
 
 
-def compare(n: int) -> bool:
-    """The table of one number of samples a cycle, and whether its targets are met."""
-    codes = samples(n)
-    part, few = codes[: len(codes) // 10], codes[: len(codes) // 40]
-    turns = np.ascontiguousarray(part[: len(part) // 4 * 4].reshape(-1, 4, CYCLES * n).transpose(0, 2, 1)).reshape(
-        -1, 4
-    )
-    woven = codes[: len(codes) // 4 * 4].reshape(-1, CYCLES * n, 4)  # the same memory read as four channels
-    words = codes.reshape(-1).view(np.int64)
-    limit, ours = "the limit: one compiled read", "catseye: amplitude and phase"
-    fft, mixer = "numpy rfft", "scipy lock-in (sosfiltfilt)"
-    contenders: dict[str, tuple[Callable[[], object], float]] = {
-        limit: (lambda: _read(words), codes.nbytes),
-        ours: (lambda: polar(phasors(codes, n, VOLTS)), codes.nbytes),
-        "catseye: everything (detect)": (lambda: detect(codes, n, VOLTS), codes.nbytes),
-        "catseye, plain: amplitude and phase": (lambda: polar(phasors(part, n, VOLTS, compiled=False)), part.nbytes),
-        "catseye, plain: everything (detect)": (lambda: detect(part, n, VOLTS, compiled=False), part.nbytes),
-        "catseye, plain: stream of 4 channels, everything": (
-            lambda: ChannelStream(4, n, CYCLES, VOLTS).feed(turns),
-            part.nbytes,
-        ),
-        "catseye: 4 interleaved channels, amplitude and phase": (
-            lambda: polar(interleaved_phasors(woven, n, VOLTS)),
-            woven.nbytes,
-        ),
-        "naive numpy sums": (lambda: polar(naive(few, n)), few.nbytes),
-        fft: (lambda: polar(transformed(few, n)), few.nbytes),
-        mixer: (lambda: polar(lock_in(few, n)), few.nbytes),
-    }
-    rate = race(contenders)
-    sys.stdout.write(f"{codes.nbytes / 1e6:.0f} MB of int16, {n} a cycle, {CYCLES} cycles: {len(codes)} buffers\n")
-    for name, each in rate.items():
-        sys.stdout.write(f"  {name:<50} {each:8.3f} GB/s {rate[ours] / each:8.2f} x slower than ours\n")
-    met = True
-    for against, least in zip((limit, fft, mixer), TARGETS[n], strict=True):
-        ratio = rate[ours] / rate[against]
-        met &= ratio >= least
-        verdict = "met" if ratio >= least else "MISSED"
-        sys.stdout.write(f"  {ratio:7.2f} times {against:<34} target {least:6.2f}: {verdict}\n")
-    answer = phasors(few, n, VOLTS)
-    for name, other in (("naive", naive(few, n)), ("rfft", transformed(few, n)), ("lock-in", lock_in(few, n))):
-        sys.stdout.write(f"  largest difference to {name}: {np.abs(other - answer).max():.1e} V\n")
-    return met
-
-
-def main() -> None:
-    """Both tables."""
-    with threadpool_limits(limits=1, user_api="blas"):
-        met = [compare(n) for n in TARGETS]
-    sys.stdout.write("all targets met\n" if all(met) else "a target is missed\n")
+def rows(quick: bool) -> Iterator[Row]:
+    """Amplitude and phase, everything that `detect` says, and interleaved channels, at 64 and 16 samples a cycle."""
+    for n in (64, 16):
+        codes = samples(n)
+        few = codes[: len(codes) // 40]
+        part = len(few) / len(codes)
+        words = codes.reshape(-1).view(np.int64)
+        reading = Contender(lambda words=words: limits.read(words))  # type: ignore[misc]
+        size = f"{codes.nbytes / 1e6:.0f} MB of int16, {n} a cycle"
+        answer = phasors(few, n, VOLTS)
+        apart = max(float(np.abs(form(few, n) - answer).max()) for form in (folded, transformed, naive))
+        yield raced(
+            "synchronous detection",
+            size,
+            {
+                "catseye": Contender(lambda c=codes, n=n: polar(phasors(c, n, VOLTS))),  # type: ignore[misc]
+                LIMIT: reading,
+                **{
+                    name: Contender(lambda form=form, c=few, n=n: polar(form(c, n)), part)  # type: ignore[misc]
+                    for name, form in ALTERNATIVES.items()
+                },
+            },
+            quick=quick,
+            clock=time.process_time,
+            note=f"phasors agree to {apart:.0e} V, the lock-in's to {np.abs(lock_in(few, n) - answer).max():.0e} V",
+        )
+        yield raced(
+            "detection with noise, harmonics, faults",
+            size,
+            {
+                "catseye": Contender(lambda c=codes, n=n: detect(c, n, VOLTS)),  # type: ignore[misc]
+                "catseye, plain numpy": Contender(lambda c=few, n=n: detect(c, n, VOLTS, compiled=False), part),  # type: ignore[misc]
+                LIMIT: reading,
+            },
+            quick=quick,
+            clock=time.process_time,
+        )
+        turns = few[: len(few) // 4 * 4].reshape(-1, 4, CYCLES * n).transpose(0, 2, 1).reshape(-1, 4).copy()
+        woven = codes[: len(codes) // 4 * 4].reshape(-1, CYCLES * n, 4)  # the same memory read as four channels
+        yield raced(
+            "detection in four interleaved channels",
+            size,
+            {
+                "catseye": Contender(lambda w=woven, n=n: polar(interleaved_phasors(w, n, VOLTS))),  # type: ignore[misc]
+                "catseye, plain numpy": Contender(
+                    lambda t=turns, n=n: ChannelStream(4, n, CYCLES, VOLTS).feed(t),  # type: ignore[misc]
+                    turns.nbytes / codes.nbytes,
+                ),
+                LIMIT: reading,
+            },
+            quick=quick,
+            clock=time.process_time,
+        )
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

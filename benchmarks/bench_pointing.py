@@ -1,23 +1,19 @@
 """Encoder counts of 18 rangers for 10^5 points each, beside what a user would write instead.
 
-Medians of interleaved rounds; in each a contender runs three times and the last is taken, as in a loop that points
-again and again. After a pause the first call waits for memory and for the second processor: `first` shows it. Ours
-takes a thread a processor and writes into the caller's array, the others take one thread and new memory.
-python benchmarks/bench_pointing.py
+python benchmarks/bench_pointing.py [--quick]
+
+Ours takes a thread a processor and writes into the caller's array, the others take one thread and new memory. The limit
+reads the points and writes as much, on one thread, too.
 """
 
-import statistics
-import sys
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
 
 import numpy as np
 from numba import njit
-from threadpoolctl import threadpool_limits
 
 from catseye.geometry.mirror.pointing import MirrorStation, aim, counts
+from harness import LIMIT, Contender, Row, main, raced
 
-ROUNDS, REPEATS = 9, 3
 RANGERS, POINTS = 18, 100_000
 
 
@@ -79,40 +75,26 @@ def plain(station: MirrorStation, points: np.ndarray) -> np.ndarray:
     return np.stack([found.azimuth_counts, found.elevation_counts], axis=-1)
 
 
-def main() -> None:
+def rows(quick: bool) -> Iterator[Row]:
+    """Counts of every ranger for every point, and the derivatives' plain form."""
     station, points = scene()
     own = np.empty((RANGERS, POINTS, 2))
-    contenders: dict[str, Callable[[], np.ndarray]] = {
-        "catseye": lambda: counts(station[:, None], points, out=own),
-        "catseye, new memory each time": lambda: counts(station[:, None], points),
-        "limit: read the points, write as much": lambda: stream(station, points),
-        "catseye's plain form (numpy, with range)": lambda: plain(station, points),
-        "numpy, whole arrays": lambda: whole_arrays(station, points),
-        "scipy rotations, a ranger at a time": lambda: scipy_rotations(station, points),
-    }
-    with threadpool_limits(1):
-        answers = {name: job() for name, job in contenders.items()}
-        spent: dict[str, list[float]] = {name: [] for name in contenders}
-        first: dict[str, list[float]] = {name: [] for name in contenders}
-        for _ in range(ROUNDS):
-            for name, job in contenders.items():
-                each = []
-                for _ in range(REPEATS):
-                    start = time.perf_counter()
-                    job()
-                    each.append(time.perf_counter() - start)
-                spent[name].append(each[-1])
-                first[name].append(each[0])
-    ours = statistics.median(spent["catseye"])
-    sys.stdout.write(f"{RANGERS} rangers x {POINTS:.0e} points to counts\n")
-    for name, times in spent.items():
-        took = statistics.median(times)
-        again = answers[name].size / 2e6 / statistics.median(first[name])
-        apart = np.abs(answers[name] - answers["catseye"]).max()
-        same = "" if name.startswith("limit") else f"   counts apart {apart:.1e}"
-        rate = answers[name].size / 2e6 / took
-        sys.stdout.write(f"  {name:<42}{rate:8.1f} M/s  {took / ours:6.2f} x ours   first {again:6.1f}{same}\n")
+    base = counts(station[:, None], points, out=own)
+    apart = max(float(np.abs(form(station, points) - base).max()) for form in (whole_arrays, scipy_rotations, plain))
+    yield raced(
+        "mirror pointing",
+        f"{RANGERS} rangers to {POINTS:.0e} points, counts",
+        {
+            "catseye": Contender(lambda: counts(station[:, None], points, out=own)),
+            "numpy, whole arrays": Contender(lambda: whole_arrays(station, points)),
+            "scipy rotations, a ranger at a time": Contender(lambda: scipy_rotations(station, points)),
+            "catseye, plain numpy, with ranges": Contender(lambda: plain(station, points)),
+            LIMIT: Contender(lambda: stream(station, points)),
+        },
+        quick=quick,
+        note=f"counts agree to {apart:.0e}",
+    )
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

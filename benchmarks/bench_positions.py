@@ -1,26 +1,24 @@
-"""A million positions from 18 known stations, beside what a user would pick instead; medians of interleaved rounds.
+"""A million positions from 18 known stations, beside what a user would pick instead.
 
-python benchmarks/bench_positions.py
+python benchmarks/bench_positions.py [--quick]
 
-gtsam and pyceres are compared where they are installed; they, and scipy, solve a sample and count per target.
+gtsam and pyceres are compared where they are installed; they, and scipy, solve a sample and count per target. The limit
+adds up what one target needs at least: its multiply-adds and roots, reading its ranges and writing its answer.
 """
 
-import importlib.util
-import statistics
-import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
-from numba import njit
 from scipy.optimize import least_squares
-from threadpoolctl import threadpool_limits
 
+import limits
 from catseye.estimation.network.positions.dispatch import positions
+from harness import LIMIT, Contender, Row, main, missing, raced
 
-ROUNDS = 7
-TARGETS, SAMPLE = 1_000_000, 500
+TARGETS, PLAIN, SAMPLE = 1_000_000, 50_000, 100
 SIGMA = 5e-5  # m
+ANSWER = 14  # float64 of each target: 113 bytes
 
 
 def site(targets: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -103,97 +101,98 @@ def factor_graph(stations: np.ndarray, starts: np.ndarray, d: np.ndarray) -> np.
     return np.array([result.atPoint3(count + t) for t in range(len(starts))])
 
 
-@njit(error_model="numpy", fastmath={"contract"})
-def _multiply_adds(a: np.ndarray, times: int) -> None:
-    for _ in range(times):
-        for i in range(len(a)):
-            x = a[i]
-            p, q, r, s = x, x, x, x  # four chains hide the latency
-            for _ in range(16):
-                p, q, r, s = p * x + 0.5, q * x + 0.4, r * x + 0.3, s * x + 0.2
-            a[i] = 0.5 + 1e-30 * (p + q + r + s)
+def least_time(ranges: np.ndarray) -> Callable[[], float]:
+    """Seconds that arithmetic, reading and writing take at least, one after another.
+
+    A range costs 32 multiply-adds or the like, 10 in the start and 22 in the evaluation, and a root with its division.
+    """
+    targets, stations = ranges.shape
+    block = limits.BLOCK.copy()
+    work, share = limits.multiply_add_work(32.0 * stations * targets)
+    turns = 1000
+    root_share = len(block) * turns / (stations * targets)
+    words = ranges.reshape(-1).view(np.int64)
+
+    def measure() -> float:
+        once = [
+            limits.median_seconds(job, 1)
+            for job in (
+                work,
+                lambda: limits.roots(block, turns),
+                lambda: limits.read(words),
+                lambda: np.empty((targets, ANSWER)).fill(0.0),
+            )
+        ]
+        return once[0] / share + once[1] / root_share + once[2] + once[3]
+
+    return measure
 
 
-@njit(error_model="numpy")
-def _roots(a: np.ndarray, times: int) -> None:
-    for _ in range(times):
-        for i in range(len(a)):
-            a[i] = 1.5 / np.sqrt(a[i])
-
-
-@njit(error_model="numpy", fastmath=True)
-def _read(d: np.ndarray) -> float:
-    total = 0.0
-    for i in range(len(d)):
-        total += d[i]
-    return total
-
-
-def race(contenders: dict[str, tuple[Callable[[], object], int]]) -> dict[str, float]:
-    """Seconds per target of each, the median of rounds in which every one has its turn."""
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    for name in contenders:
-        contenders[name][0]()  # compiled, loaded, memory touched
-    for _ in range(ROUNDS):
-        for name, (work, count) in contenders.items():
-            start = time.perf_counter()
-            work()
-            times[name].append((time.perf_counter() - start) / count)
-    return {name: statistics.median(t) for name, t in times.items()}
-
-
-def main() -> None:
-    """Rates, ratios, what the machine could do at most, and that all agree."""
+def rows(quick: bool) -> Iterator[Row]:
+    """All ranges measured; each with a sigma of its own; a tenth and a third of them missing."""
     stations, starts, d = site(TARGETS)
-    sigma = np.full(18, SIGMA)
-    each = np.broadcast_to(sigma, d.shape).copy()
-    lot = np.random.default_rng(1).random(d.shape)
-    tenth, third = np.where(lot < 0.1, np.nan, d), np.where(lot < 1 / 3, np.nan, d)
+    sigma = np.full(len(stations), SIGMA)
     few = slice(0, SAMPLE)
-    ours, block = "catseye, compiled, one thread", np.linspace(1.0, 2.0, 1024)
-    contenders: dict[str, tuple[Callable[[], object], int]] = {
-        ours: (lambda: positions(stations, d, sigma), TARGETS),
-        "catseye, compiled, two threads": (lambda: positions(stations, d, sigma, threads=2), TARGETS),
-        "catseye, compiled, a sigma for each range": (lambda: positions(stations, d, each), TARGETS),
-        "catseye, compiled, a tenth of the ranges missing": (lambda: positions(stations, tenth, sigma), TARGETS),
-        "catseye, compiled, a third of the ranges missing": (lambda: positions(stations, third, sigma), TARGETS),
-        "catseye, plain numpy": (lambda: positions(stations, d[:100_000], sigma, compiled=False), 100_000),
-        "scipy least_squares (lm)": (lambda: scipy_lm(stations, starts[few], d[few]), SAMPLE),
+    base = positions(stations, d[few], sigma, compiled=True).require_found().x
+    peers = {"scipy least_squares (lm)": scipy_lm}
+    skipped = missing("pyceres", "gtsam")
+    peers |= {
+        name: solve
+        for name, module, solve in (
+            ("pyceres, positions alone", "pyceres", ceres),
+            ("gtsam with marginals", "gtsam", factor_graph),
+        )
+        if module not in skipped
     }
-    peers = {"pyceres": ("pyceres, positions only", ceres), "gtsam": ("gtsam, with marginals", factor_graph)}
-    for module, (name, solve) in peers.items():
-        if importlib.util.find_spec(module):
-            contenders[name] = (lambda solve=solve: solve(stations, starts[few], d[few]), SAMPLE)  # type: ignore[misc]
-        else:
-            sys.stdout.write(f"  {module}: not installed\n")
-    bounds: dict[str, tuple[Callable[[], object], int]] = {
-        "fma": (lambda: _multiply_adds(block, 200), 64 * 1024 * 200),
-        "root": (lambda: _roots(block, 1000), 1024 * 1000),
-        "read": (lambda: _read(d.ravel()), TARGETS),
-        "write": (lambda: np.empty((TARGETS, 14)).fill(0.0), TARGETS),  # 113 bytes of answer
-    }
-    with threadpool_limits(limits=1, user_api="blas"):
-        cost = race(contenders | bounds)
-        base = positions(stations, d[few], sigma, compiled=True).require_found().x
-        answers = {"scipy": scipy_lm(stations, starts[few], d[few])}
-        for module, (_, solve) in peers.items():
-            if importlib.util.find_spec(module):
-                answers[module] = solve(stations, starts[few], d[few])
-    sys.stdout.write(f"Positions of {TARGETS} targets from 18 known stations, with covariance and status\n")
-    for name in contenders:
-        sys.stdout.write(f"  {name:<52} {1e-6 / cost[name]:10.4f} M targets/s {cost[name] / cost[ours]:10.1f} x\n")
-    for name, x in answers.items():
-        sys.stdout.write(f"  largest difference to {name}: {np.abs(x - base).max() * 1e9:.3f} nm\n")
-    # a range: start 10 and evaluation 22 multiply-adds or the like, a root and its division
-    arithmetic = 18 * (32 * cost["fma"] + cost["root"])
-    sys.stdout.write(
-        f"  the machine, one thread: {1e-9 / cost['fma']:.1f} G multiply-adds/s, "
-        f"{cost['root'] * 1e9:.2f} ns a root with division,\n  {144e-9 / cost['read']:.1f} GB/s read, "
-        f"{cost['write'] * 1e9:.1f} ns to write one answer to new memory\n"
-        f"  its bound: arithmetic {1e-6 / arithmetic:.1f} M targets/s; with reading and writing, one after the other, "
-        f"{1e-6 / (arithmetic + cost['read'] + cost['write']):.1f} M targets/s\n"
+    apart = max(float(np.abs(solve(stations, starts[few], d[few]) - base).max()) for solve in peers.values())
+    bound = Contender(least_time(d), timed=True)
+    plain = Contender(lambda: positions(stations, d[:PLAIN], sigma, compiled=False), PLAIN / TARGETS)
+    yield raced(
+        "positions",
+        f"{TARGETS:.0e} targets from {len(stations)} stations, covariance, one thread",
+        {
+            "catseye": Contender(lambda: positions(stations, d, sigma)),
+            "numpy, structure of arrays": plain,
+            **{
+                name: Contender(lambda solve=solve: solve(stations, starts[few], d[few]), SAMPLE / TARGETS)  # type: ignore[misc]
+                for name, solve in peers.items()
+            },
+            LIMIT: bound,
+        },
+        quick=quick,
+        clock=time.process_time,
+        note=f"largest difference to the others {apart * 1e9:.2g} nm",
+        skipped=skipped,
     )
+    yield raced(
+        "positions, two threads",
+        "the same",
+        {"catseye": Contender(lambda: positions(stations, d, sigma, threads=2)), "numpy, structure of arrays": plain},
+        quick=quick,
+        clock=time.perf_counter,
+    )
+    lot = np.random.default_rng(1).random(d.shape)
+    for name, ranges, u in (
+        ("a sigma for each range", d, np.broadcast_to(sigma, d.shape).copy()),
+        ("a third of the ranges missing", np.where(lot < 1 / 3, np.nan, d), sigma),
+    ):
+        yield raced(
+            "positions",
+            name,
+            {
+                "catseye": Contender(lambda r=ranges, u=u: positions(stations, r, u)),  # type: ignore[misc]
+                "numpy, structure of arrays": Contender(
+                    lambda r=ranges[:PLAIN], u=u[:PLAIN] if u.ndim == 2 else u: positions(  # type: ignore[misc]
+                        stations, r, u, compiled=False
+                    ),
+                    PLAIN / TARGETS,
+                ),
+                LIMIT: bound,
+            },
+            quick=quick,
+            clock=time.process_time,
+        )
 
 
 if __name__ == "__main__":
-    main()
+    main(rows)

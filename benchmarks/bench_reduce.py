@@ -1,24 +1,28 @@
-"""What the main job costs, beside what a user would pick instead; ratios of one run, medians of rounds.
+"""What the main job costs, from a night's samples to coordinates, beside what a user would pick instead.
 
-python benchmarks/bench_reduce.py           all of it
+python benchmarks/bench_reduce.py [--quick] [--curves]
 python benchmarks/bench_reduce.py --files   what commands take of the whole dish, files and page with them
 python benchmarks/bench_reduce.py --next    the same of 5000 prisms and 100 000 shots: an hour, and memory
+
+The whole dish: 18 rangers, each prism from all six of the feed arm, 64 x 128 samples a shot; nights of more and more
+prisms, each in a process of its own.
 """
 
+import functools
 import json
 import os
-import statistics
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import least_squares
-from threadpoolctl import threadpool_limits
 
+import limits
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.records.night.campaign import read_campaign
@@ -29,50 +33,35 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.shots import shot_group
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.signal.detection.phase import detect
+from harness import LIMIT, Contender, Curve, Row, main, raced, spread
 
-ROUNDS = 5
 EXAMPLE = Path(__file__).parents[1] / "examples" / "night-01"
+SIZES = (60, 120, 250, 500, 1000, 2209)
+SPARSE_AT = 500  # prisms at which a general sparse solver is tried beside; at 2209 it takes minutes
 
 
-def seconds(work: Callable[[], object]) -> float:
-    """Median wall time of a few rounds."""
-    times = []
-    for _ in range(ROUNDS):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
-
-
-def show(rows: list[tuple[str, float]], ours: str) -> None:
-    """A table of times and of ratios to ours."""
-    base = dict(rows)[ours]
-    for name, t in rows:
-        sys.stdout.write(f"  {name:<58} {t * 1e3:9.1f} ms {t / base:8.1f} x\n")
-    sys.stdout.write("\n")
-
-
-def detection() -> None:
+def detection(*, quick: bool) -> Row:
     """Samples to phasors."""
     frames = np.load(EXAMPLE / "frames.npy")
     angle = 2 * np.pi * np.arange(frames.shape[1]) / 64
     cosine, sine = np.cos(angle), np.sin(angle)
-    size = frames.nbytes / 1e6
-    sys.stdout.write(f"Detection of {len(frames)} buffers of {frames.shape[1]} samples ({size:.0f} MB)\n")
-    ours = "catseye detect: phasor, uncertainty, harmonics, noise, clipping"
-    show(
-        [
-            (ours, seconds(lambda: detect(frames, 64))),
-            ("numpy sums of eq. 5.1 and 5.2: phasor alone", seconds(lambda: (frames @ cosine, frames @ sine))),
-            ("numpy rfft: phasor and harmonics", seconds(lambda: np.fft.rfft(frames))),
-            ("one read of the samples (the limit)", seconds(lambda: frames.max())),
-        ],
-        ours,
+    words = frames.reshape(-1).view(np.int64)
+    return raced(
+        "night-01, detection",
+        f"{len(frames)} buffers of {frames.shape[1]} samples with uncertainty, harmonics, noise, clipping",
+        {
+            "catseye": Contender(lambda: detect(frames, 64)),
+            "numpy, sums as written, phasor alone": Contender(lambda: (frames @ cosine, frames @ sine)),
+            "numpy rfft, phasor and harmonics": Contender(lambda: np.fft.rfft(frames)),
+            LIMIT: Contender(lambda: limits.read(words)),
+        },
+        quick=quick,
+        clock=time.process_time,
     )
 
 
-def adjustment() -> None:
-    """The network of night-01: 600 unknowns, correlated ranges."""
+def adjustment(*, quick: bool) -> Iterator[Row]:
+    """The network of night-01: 600 unknowns, correlated ranges; alone, and with rejection, cycles and air renewed."""
     campaign, settings = read_campaign(EXAMPLE), ReductionSettings()
     phases = measure_phases(campaign, settings)
     electronics, _ = follow_electronics(campaign, phases)
@@ -100,104 +89,122 @@ def adjustment() -> None:
             rows.append(np.linalg.solve(factor, full) if factor.ndim == 2 else full / factor[:, None])
         return np.concatenate(rows)[:, free]
 
-    sys.stdout.write(f"Adjustment of {sum(len(g.observed) for g in groups)} observations, {free.sum()} unknowns\n")
-    ours = "catseye adjust: answer, covariance, every test statistic"
-    with threadpool_limits(limits=1, user_api="blas"):
-        show(
-            [
-                (ours, seconds(lambda: adjust(x0, groups, free=free))),
-                (
-                    "the same with rejection, cycles and air renewed",
-                    seconds(lambda: adjust_coordinates(campaign, phases, electronics, settings=settings)),
-                ),
-                (
-                    "scipy least_squares, analytic Jacobian: answer alone",
-                    seconds(lambda: least_squares(whitened, x0[free], jac=jacobian, x_scale="jac")),
-                ),
-            ],
-            ours,
-        )
-
-
-def whole() -> None:
-    """The main job without its report."""
-    sys.stdout.write("The main job: campaign read, samples to coordinates, pose, surface\n")
-    ours = "read_campaign and reduce_epoch"
-    show([(ours, seconds(lambda: reduce_epoch(read_campaign(EXAMPLE))))], ours)
-
-
-SIZES = (60, 120, 250, 500, 1000, 2209)
-SPARSE_AT = 500  # prisms at which a general sparse solver is tried beside; at 2209 it takes minutes
-
-
-def whole_dish() -> None:
-    """Nights of more and more prisms, each in a process of its own: seconds and memory from samples to coordinates."""
-    sys.stdout.write(
-        "The whole dish: 18 rangers, each prism from all six of the feed arm, 64 x 128 samples a shot\n"
-        "  prisms  shots    read   samples to  of which          memory  border  beside one read\n"
-        "                 samples  coordinates  adjustment, rejection          of the samples\n"
+    size = f"{sum(len(g.observed) for g in groups)} observations, {free.sum()} unknowns"
+    scipy = Contender(lambda: least_squares(whitened, x0[free], jac=jacobian, x_scale="jac"))
+    yield raced(
+        "night-01, one adjustment",
+        f"{size}, covariance and tests",
+        {
+            "catseye": Contender(lambda: adjust(x0, groups, free=free)),
+            "scipy least_squares, analytic Jacobian, answer alone": scipy,
+        },
+        quick=quick,
+        clock=time.process_time,
     )
-    told = []
+    yield raced(
+        "night-01, adjustment with rejection, cycles and air",
+        size,
+        {
+            "catseye": Contender(lambda: adjust_coordinates(campaign, phases, electronics, settings=settings)),
+            "scipy least_squares, one fit of it, answer alone": scipy,
+        },
+        quick=quick,
+        clock=time.process_time,
+    )
+    words = np.load(EXAMPLE / "frames.npy").reshape(-1).view(np.int64)
+    yield raced(
+        "night-01, samples to coordinates",
+        f"campaign read, {len(campaign.shots.shot)} shots, {size}",
+        {
+            "catseye": Contender(lambda: reduce_epoch(read_campaign(EXAMPLE))),
+            LIMIT: Contender(lambda: limits.read(words)),
+        },
+        quick=quick,
+        clock=time.process_time,
+    )
+
+
+@functools.cache
+def nights() -> tuple[dict[str, float], ...]:
+    """Measurements of `one_night` for each size."""
+    found = []
     with tempfile.TemporaryDirectory() as directory:
-        for prisms in (*SIZES, -2209):  # the last: 20 000 shots
-            place = Path(directory) / "night"
+        for prisms in SIZES:
             run = subprocess.run(
-                [sys.executable, __file__, "--one", str(prisms), str(place)],
+                [sys.executable, __file__, "--one", str(prisms), str(Path(directory) / "night")],
                 check=True, capture_output=True, text=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
             )  # fmt: skip
-            told.append(json.loads(run.stdout.splitlines()[-1]))
-            one = told[-1]
-            sys.stdout.write(
-                f"  {abs(prisms):6d} {one['shots']:6d} {one['read']:7.2f} s {one['whole']:9.2f} s"
-                f" {one['settle']:9.2f} s {one['gb']:13.2f} GB {one['border']:7d} {one['whole'] / one['read']:8.0f} x\n"
-            )
-            if prisms == SPARSE_AT:
-                sys.stdout.write(
-                    f"         one step of it by scipy.sparse (splu of the same normal equations) "
-                    f"{one['splu']:.2f} s, {one['splu'] / one['step']:.1f} x our {one['step']:.2f} s\n"
-                )
-    size, seconds_, memory = (np.log([t[k] for t in told[: len(SIZES)]]) for k in ("prisms", "whole", "gb"))
-    sys.stdout.write(
-        f"  exponent against prisms from {SIZES[0]} to {SIZES[-1]}: time {np.polyfit(size, seconds_, 1)[0]:.2f}, "
-        f"memory {np.polyfit(size, memory, 1)[0]:.2f}\n\n"
+            found.append(json.loads(run.stdout.splitlines()[-1]))
+    return tuple(found)
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    """night-01 step by step; then the whole dish, not in quick mode."""
+    yield detection(quick=quick)
+    yield from adjustment(quick=quick)
+    if quick:
+        return
+    by_size = dict(zip(SIZES, nights(), strict=True))
+    some, dish = by_size[SPARSE_AT], by_size[SIZES[-1]]
+    yield Row(
+        path="whole dish, one step of the adjustment",
+        what=f"{SPARSE_AT} prisms, {some['shots']:.0f} shots",
+        ours_s=some["step"],
+        beside={"scipy.sparse splu of the same normal equations": some["splu"]},
+        limit_s=None,
+        spread=some["step_spread"],
     )
+    yield Row(
+        path="whole dish, samples to coordinates",
+        what=f"{SIZES[-1]} prisms, {dish['shots']:.0f} shots",
+        ours_s=dish["whole"],
+        beside={},
+        limit_s=dish["read"],
+        spread=0.0,
+        note=f"processor time of one run; {dish['gb']:.2f} GB at most; adjustment and rejection {dish['settle']:.1f} s; the "
+        "limit is one read of the samples",
+    )
+
+
+def curves(quick: bool) -> Iterator[Curve]:
+    """Seconds and memory against prisms."""
+    if quick:
+        return
+    for what, key, unit in (("18 rangers, processor time", "whole", "s"), ("18 rangers, memory", "gb", "GB")):
+        values = tuple(night[key] for night in nights())
+        yield Curve("whole dish, samples to coordinates", what, "prisms", SIZES, values, unit)
 
 
 def one_night(prisms: int, place: Path) -> None:
-    """One size of `whole_dish`; prints a JSON line."""
+    """Measure one size: processor s and GB, as a JSON line on standard output."""
     import resource
 
     import catseye.reduction.epoch.coordinates as coordinates
     from catseye.api.night import night
     from catseye.reduction.epoch.epoch import reduce_epoch as reduced
 
-    if prisms != SIZES[0] or not place.exists():
-        import shutil
-
-        shutil.rmtree(place, ignore_errors=True)
-        night(place, dish_prisms=abs(prisms), again=0.43 if prisms < 0 else 0.0, nature=0.0)
+    shutil.rmtree(place, ignore_errors=True)
+    night(place, dish_prisms=prisms, again=0.0, nature=0.0)
     took = {}
     settle = coordinates.iterate_adjustment
 
-    def timed(*given, **options):
-        begun = time.perf_counter()
-        answer = settle(*given, **options)
-        took["settle"] = time.perf_counter() - begun
+    def timed(*arguments, **options):
+        begun = time.process_time()
+        answer = settle(*arguments, **options)
+        took["settle"] = time.process_time() - begun
         return answer
 
     coordinates.iterate_adjustment = timed
     campaign = read_campaign(place)
     reduced(read_campaign(EXAMPLE), ReductionSettings(dense_shots=0))  # kernels loaded
-    before = time.perf_counter()
+    before = time.process_time()
     reduction = reduced(campaign)
-    took["whole"] = time.perf_counter() - before
+    took["whole"] = time.process_time() - before
     took["gb"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    q = getattr(reduction.coordinates.joint.q, "inner", None)  # beneath the common errors
-    took["border"] = len(q.eliminated.blocks.outer) if hasattr(q, "eliminated") else 0
     frames = np.load(place / "frames.npy", mmap_mode="r")
-    before = time.perf_counter()
+    before = time.process_time()
     frames.max()
-    took |= {"read": time.perf_counter() - before, "prisms": abs(prisms), "shots": len(campaign.shots.shot)}
+    took |= {"read": time.process_time() - before, "shots": len(campaign.shots.shot)}
     if prisms == SPARSE_AT:
         took |= one_step(campaign, reduction)
     sys.stdout.write(json.dumps(took) + "\n")
@@ -219,12 +226,21 @@ def one_step(campaign, reduction) -> dict[str, float]:
     groups = [shot_group(network, name, x)[0] for name in network.rangers] + network.priors
     rows = [ActiveRows.of(g) for g in groups]
     solver = SolverSettings(iterations=1, tests=False, border=network.border)
-    ours = seconds(lambda: (network.border.forget(), adjust(x, groups, free=free, solver=solver)))
-    before = time.perf_counter()
+    taken = []
+    for _ in range(5):
+        before = time.process_time()
+        network.border.forget()
+        adjust(x, groups, free=free, solver=solver)
+        taken.append(time.process_time() - before)
+    before = time.process_time()
     normal = sum((_gram(r, r.linear(x)[1], len(x)) for r in rows), start=csc_array((len(x), len(x))))
     moving = np.flatnonzero(free)
     splu(csc_array(normal)[:, moving][:, :][moving], permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-    return {"step": ours, "splu": time.perf_counter() - before}
+    return {
+        "step": float(np.median(taken)),
+        "step_spread": spread(np.array(taken)),
+        "splu": time.process_time() - before,
+    }
 
 
 WHOLE, NEXT = (2209, 0.43, 8.0), (5000, 2.15, 4.8)  # prisms, how often each is shot again, s between two shots
@@ -272,12 +288,7 @@ def files_and_page(prisms: int, again: float, interval_s: float) -> None:
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
         one_night(int(sys.argv[2]), Path(sys.argv[3]))
-        sys.exit()
-    if sys.argv[1:2] in (["--files"], ["--next"]):
+    elif sys.argv[1:2] in (["--files"], ["--next"]):
         files_and_page(*(WHOLE if sys.argv[1] == "--files" else NEXT))
-        sys.exit()
-    detection()
-    adjustment()
-    whole()
-    whole_dish()
-    files_and_page(*WHOLE)
+    else:
+        main(rows, curves)

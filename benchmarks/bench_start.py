@@ -1,28 +1,32 @@
-"""Time from a command to its first shot: a living site started again and again.
+"""Time to begin: imports, the command's help, and from a command to a living site's first shot.
 
-python benchmarks/bench_start.py [--tries 5] [--site gbt] [--cold] [--json]
+python benchmarks/bench_start.py [--quick]
+python benchmarks/bench_start.py --cold    with empty caches of Python's and of numba's compiled code, too
 
 `simulate` and `serve --twin` are started with any free ports and a port that this program listens to; the time counts
 from the start of the process until the coordinator says that the first shot is durable, the processor time is that of
-all its processes until then. `--cold` starts each with empty caches of Python's and of numba's compiled code, as after
-an installation. Of the time some 2.6 s are the first mirror's way from its index to the cube inside, which no computer
-shortens; on a busy machine look at the processor time.
+all its processes until then. Of the time some 2.6 s are the first mirror's way from its index to the cube inside, which
+no computer shortens. Imports count the processor time of a process of their own.
 """
 
-import argparse
-import json
 import os
+import resource
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
-from statistics import median
+
+import numpy as np
+
+from harness import LIMIT, Contender, Row, main, raced, spread
 
 COMMANDS = {"simulate": ("--minutes", "0"), "serve": ("--twin", "--start", "60635.125")}
+SITE, TRIES, COLD = "gbt", 3, "--cold"
 PORTS = range(41_000, 60_000, 400)  # bases of a twin's ports
 LONGEST = 180.0  # s
 TICK = os.sysconf("SC_CLK_TCK")
@@ -99,34 +103,66 @@ def connected(port: int, process: "subprocess.Popen[bytes]") -> socket.socket:
     raise SystemExit("the coordinator did not start")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--tries", type=int, default=5)
-    parser.add_argument("--site", default="gbt")
-    parser.add_argument("--cold", action="store_true", help="with empty caches of compiled code, too")
-    parser.add_argument("--json", action="store_true")
-    options = parser.parse_args()
-    first_shot("simulate", options.site, None)  # which fills the caches
-    rows = []
-    for cold in (False, True) if options.cold else (False,):
-        for command in COMMANDS:
-            told = []
-            for _ in range(options.tries):
-                with tempfile.TemporaryDirectory(prefix="catseye-bench-") as folder:
-                    told.append(first_shot(command, options.site, Path(folder) if cold else None))
-            wall, spent = (median(values) for values in zip(*told, strict=True))
-            rows.append({"command": command, "cold": cold, "wall_s": wall, "processor_s": spent})
-    load = os.getloadavg()[0]
-    if options.json:
-        sys.stdout.write(json.dumps({"first_shot": rows, "tries": options.tries, "load": load}) + "\n")
+def processor(*words: str) -> float:
+    """Processor s of a Python of its own."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-P", *words], check=True, stdout=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def started(*words: str) -> Contender:
+    """Contender of a Python's whole life."""
+    return Contender(lambda: processor(*words), timed=True)
+
+
+def site_row(command: str, *, cold: bool) -> Row:
+    """Row of a living site's start."""
+    taken = []
+    for _ in range(TRIES):
+        with tempfile.TemporaryDirectory(prefix="catseye-bench-") as folder:
+            taken.append(first_shot(command, SITE, Path(folder) if cold else None))
+    wall, spent = np.array(taken).T
+    return Row(
+        path=f"{command}, command to first shot",
+        what=f"site {SITE}, {'empty' if cold else 'usual'} caches",
+        ours_s=float(np.median(wall)),
+        beside={},
+        limit_s=None,
+        spread=spread(wall),
+        note=f"{np.median(spent):.1f} s of processors",
+    )
+
+
+def rows(quick: bool) -> Iterator[Row]:
+    """Imports and help; in a whole run the starts of a living site."""
+    yield raced(
+        "import catseye",
+        "processor time of a new Python",
+        {
+            "catseye": started("-c", "import catseye"),
+            "numpy": started("-c", "import numpy"),
+            "scipy.optimize and scipy.signal": started("-c", "import scipy.optimize, scipy.signal"),
+            "astropy.coordinates": started("-c", "import astropy.coordinates"),
+            LIMIT: started("-c", "pass"),
+        },
+        quick=quick,
+        note="the limit is Python alone",
+    )
+    yield raced(
+        "catseye --help",
+        "processor time of a new Python",
+        {"catseye": started("-m", "catseye", "--help"), LIMIT: started("-c", "import typer")},
+        quick=quick,
+        note="the limit is Python with typer",
+    )
+    if quick:
         return
-    sys.stdout.write(f"command to first shot, medians of {options.tries}; load of the machine {load:.1f}\n")
-    for row in rows:
-        caches = "empty caches" if row["cold"] else "usual caches"
-        sys.stdout.write(
-            f"  {row['command']:<9} {caches}  {row['wall_s']:5.1f} s, {row['processor_s']:5.1f} s of processors\n"
-        )
+    first_shot("simulate", SITE, None)  # which fills the caches
+    for cold in (False, True) if COLD in sys.argv else (False,):
+        for command in COMMANDS:
+            yield site_row(command, cold=cold)
 
 
 if __name__ == "__main__":
-    main()
+    main(rows, flags={COLD: "a living site's start with empty caches, too"})

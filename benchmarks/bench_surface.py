@@ -1,16 +1,15 @@
-"""Paraboloids through 2209 prisms at a thousand epochs, beside a loop over scipy; medians of interleaved rounds.
+"""Paraboloids through 2209 prisms at 200 epochs, beside a loop over scipy.
 
-python benchmarks/bench_surface.py [--epochs 1000]
+python benchmarks/bench_surface.py [--quick] [--curves]
 
-All six parameters of each epoch with covariance and deviations. The peer is what a user would write: least_squares a
-epoch with its own numerical or an analytic Jacobian, covariance from it; it solves a sample and counts an epoch.
+All six parameters of each epoch with covariance and deviations, one thread. A user would write least_squares for each
+epoch, with its own numerical or an analytic Jacobian, and the covariance from it; it solves a sample and counts an
+epoch. The limit is 60 multiply-adds a prism in each of two iterations.
 """
 
-import argparse
-import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +19,17 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+import limits
 from catseye.estimation.shapes.surface_series import fit_series
+from harness import LIMIT, Contender, Curve, Row, main, raced
 from surface_scene import OWN, PLACES
 
-ROUNDS, SAMPLE = 5, 20
+EPOCHS, SAMPLE = 200, 10
+GROWING = (10, 30, 100, 300, 1000)  # epochs
 F, SIGMA = 60.0, 5e-5
 FREE = ("vertex", "axis", "focal-length")
+ITERATIONS = 2  # at least, the second to see that nothing changes
+POINT_COST = 60  # multiply-adds of a prism in an iteration: deviation, 6 derivatives, 27 of the normal equations
 
 
 def night(epochs: int) -> np.ndarray:
@@ -69,47 +73,46 @@ def by_scipy(points: np.ndarray, analytic: bool) -> np.ndarray:
     return found
 
 
-def race(contenders: dict[str, tuple[Callable[[], object], int]]) -> dict[str, float]:
-    """Seconds an epoch of each, the median of rounds in which every one has its turn."""
-    times: dict[str, list[float]] = {name: [] for name in contenders}
-    for work, _ in contenders.values():
-        work()  # compiled, loaded, memory touched
-    for _ in range(ROUNDS):
-        for name, (work, count) in contenders.items():
-            start = time.perf_counter()
-            work()
-            times[name].append((time.perf_counter() - start) / count)
-    return {name: statistics.median(t) for name, t in times.items()}
-
-
-def main() -> None:
-    """Times, ratios, and that all agree."""
-    parser = argparse.ArgumentParser(description="Paraboloids through 2209 prisms at many epochs.")
-    parser.add_argument("--epochs", type=int, default=1000)
-    epochs = parser.parse_args().epochs
-    points, variance = night(epochs), np.full(len(PLACES), SIGMA**2)
+def rows(quick: bool) -> Iterator[Row]:
+    """A surface at each epoch."""
+    points, variance = night(EPOCHS), np.full(len(PLACES), SIGMA**2)
     few = points[:SAMPLE]
-    ours = "catseye, compiled, one thread"
-    contenders: dict[str, tuple[Callable[[], object], int]] = {
-        ours: (lambda: fit_series(points, variance, OWN, focal_length=F, free=FREE, compiled=True), epochs),
-        "catseye, plain numpy": (
-            lambda: fit_series(few, variance, OWN, focal_length=F, free=FREE, compiled=False),
-            SAMPLE,
-        ),
-        "scipy least_squares (lm), analytic Jacobian": (lambda: by_scipy(few, True), SAMPLE),
-        "scipy least_squares (lm), its own Jacobian": (lambda: by_scipy(few, False), SAMPLE),
-    }
-    with threadpool_limits(limits=1, user_api="blas"):
-        cost = race(contenders)
-        found = fit_series(points, variance, OWN, focal_length=F, free=FREE, compiled=True).require_converged()
-        peer = by_scipy(few, True)
-    off = np.abs(found.parameters[:SAMPLE] - peer) / np.sqrt(np.einsum("tii->ti", found.covariance[:SAMPLE]))
-    sys.stdout.write(f"{len(PLACES)} prisms, {epochs} epochs, six parameters, covariance, deviations\n")
-    for name, seconds in cost.items():
-        sys.stdout.write(f"  {name:<46} {1e3 * seconds:9.3f} ms an epoch {seconds / cost[ours]:9.1f} x\n")
-    sys.stdout.write(f"  all epochs, {ours}: {cost[ours] * epochs:.2f} s\n")
-    sys.stdout.write(f"  largest difference to scipy: {off.max():.1e} of a standard uncertainty\n")
+
+    def ours(epochs: np.ndarray, compiled: bool):  # type: ignore[no-untyped-def]
+        return fit_series(epochs, variance, OWN, focal_length=F, free=FREE, compiled=compiled).require_converged()
+
+    fitted, peer = ours(points, True), by_scipy(few, True)
+    off = np.abs(fitted.parameters[:SAMPLE] - peer) / np.sqrt(np.einsum("tii->ti", fitted.covariance[:SAMPLE]))
+    work, share = limits.multiply_add_work(POINT_COST * len(PLACES) * EPOCHS * ITERATIONS)
+    yield raced(
+        "surface fits",
+        f"{len(PLACES)} prisms, {EPOCHS} epochs, six parameters with covariance",
+        {
+            "catseye": Contender(lambda: ours(points, True)),
+            "scipy least_squares (lm), analytic Jacobian": Contender(lambda: by_scipy(few, True), SAMPLE / EPOCHS),
+            "scipy least_squares (lm), its own Jacobian": Contender(lambda: by_scipy(few, False), SAMPLE / EPOCHS),
+            "catseye, plain numpy": Contender(lambda: ours(few, False), SAMPLE / EPOCHS),
+            LIMIT: Contender(work, share),
+        },
+        quick=quick,
+        clock=time.process_time,
+        note=f"largest difference to scipy {off.max():.0e} of a standard uncertainty",
+    )
+
+
+def curves(quick: bool) -> Iterator[Curve]:
+    """Seconds against epochs."""
+    points, variance = night(GROWING[-1]), np.full(len(PLACES), SIGMA**2)
+    with threadpool_limits(limits=1):
+        seconds = [
+            limits.median_seconds(
+                lambda n=n: fit_series(points[:n], variance, OWN, focal_length=F, free=FREE, compiled=True),  # type: ignore[misc]
+                3,
+            )
+            for n in GROWING
+        ]
+    yield Curve("surface fits", f"{len(PLACES)} prisms", "epochs", GROWING, tuple(seconds))
 
 
 if __name__ == "__main__":
-    main()
+    main(rows, curves)

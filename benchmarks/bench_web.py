@@ -1,24 +1,19 @@
 """The page beside a busy site: its share of a core, and the time from shot to durable with and without it.
 
-python benchmarks/bench_web.py [--seconds 30] [--clients 50] [--rangers 18] [--json]
-python benchmarks/bench_web.py --lasting 30 [--clients 50]
+python benchmarks/bench_web.py [--quick]
+python benchmarks/bench_web.py --lasting 30    minutes: the page's memory, and its growth in the last two thirds
 
 18 rangers stream 128 ms buffers back to back to a coordinator with a journal, as in bench_live.py; the site has Green
-Bank's 2268 targets. In one run: without a page, with one that nobody looks at, with one client, with 50 of which one
-takes nothing, and without a page again. Clients are in a process of their own and read all they get. The share of a
+Bank's 2268 targets. In one run: without a page, with one that nobody looks at, with 50 clients of which one takes
+nothing, and without a page again. Clients are in a process of their own and read all they get. The share of a
 core is the page's process; the delay, from the end of a buffer until its entry is durable, is the coordinator's, whose
 ratio tells if the page slows the site. First page: the time and the bytes of all that a browser asks for before it
 shows the site.
-
-`--lasting` runs so many minutes with all clients, and prints the page's memory each minute and its growth in the last
-two thirds.
 """
 
-import argparse
 import asyncio
 import gzip
 import json
-import os
 import re
 import sys
 import time
@@ -27,9 +22,14 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+import numpy as np
+
+from harness import Row, main
 from web.busy_scene import LOOK, busy_site, cpu_of, growth_of, listening_to, memory_of, memory_over, page_of
 
 SETTLED = 3.0  # s after clients came
+SECONDS, CLIENTS, RANGERS = 8.0, 50, 18
+CROWD = f"{CLIENTS} clients, 1 stuck"
 ASSET = re.compile(r'(?:src|href)="(/[^"]+)"')
 API = ("/api/service", "/api/site", "/api/state", "/api/epochs?limit=1")
 
@@ -75,60 +75,73 @@ async def with_clients(busy, page, count, stuck, seconds):
     }
 
 
-async def measured(options):
-    async with busy_site(rangers=options.rangers) as busy:
-        rows = {"without a page": await busy.delay(options.seconds)}
+async def measured():
+    async with busy_site(rangers=RANGERS) as busy:
+        rows = {"without a page": await busy.delay(SECONDS)}
         async with page_of(busy) as page:
             await asyncio.sleep(SETTLED)
             base = f"http://127.0.0.1:{page.address.port}"
             first = await asyncio.to_thread(first_page, base)
-            for name, count, stuck in (
-                ("nobody looks", 0, 0),
-                ("1 client", 1, 0),
-                (f"{options.clients} clients, 1 stuck", options.clients, 1),
-            ):
-                rows[name] = await with_clients(busy, page, count, stuck, options.seconds)
-        rows["without a page again"] = await busy.delay(options.seconds)
-    return {"rows": rows, "first_page": first, "load": os.getloadavg()[0]}
+            for name, count, stuck in (("nobody looks", 0, 0), (CROWD, CLIENTS, 1)):
+                rows[name] = await with_clients(busy, page, count, stuck, SECONDS)
+        rows["without a page again"] = await busy.delay(SECONDS)
+    return {"rows": rows, "first_page": first}
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seconds", type=float, default=30.0)
-    parser.add_argument("--clients", type=int, default=50)
-    parser.add_argument("--rangers", type=int, default=18)
-    parser.add_argument("--json", action="store_true")
-    parser.add_argument("--lasting", type=float, metavar="MINUTES")
-    options = parser.parse_args()
-    if options.lasting is not None:
-        memory, counts = asyncio.run(memory_over(options.lasting, clients=options.clients))
-        minutes = ", ".join(f"{mb:.2f}" for mb in memory[:: round(60.0 / LOOK)])
-        sys.stdout.write(f"memory each minute, MB: {minutes}\ngrowth {growth_of(memory):.2f} MB; {counts}\n")
+def rows(quick):
+    """Cost of the page to the site, its own processor time, and the first page; not in quick mode: a minute or more."""
+    if quick:
         return
-    found = asyncio.run(measured(options))
-    if options.json:
-        sys.stdout.write(json.dumps(found, indent=1) + "\n")
-        return
-    rows = found["rows"]
-    alone = 0.5 * (rows["without a page"]["p99_ms"] + rows["without a page again"]["p99_ms"])
-    for name, row in rows.items():
-        text = (
-            f"{name:<22} durable p50 {row['p50_ms']:6.1f} ms, p99 {row['p99_ms']:6.1f} ms ({row['p99_ms'] / alone:.2f})"
-        )
-        text += f", {row['shots_a_second']:.0f} shots/s, coordinator {row['coordinator_percent']:.0f} % of a core"
-        if "page_percent" in row:
-            text += f"; page {row['page_percent']:.1f} %, {row['page_mb']:.0f} MB"
-            text += (
-                f", {row['events_a_second_a_client']:.0f} events/s and {row['bytes_a_second_a_client'] / 1e3:.1f} kB/s"
-            )
-        sys.stdout.write(text + "\n")
-    page = found["first_page"]
-    total = page["file_bytes"] + sum(page["answer_bytes"].values())
-    sys.stdout.write(
-        f"first page: {page['seconds']:.2f} s, {total / 1e3:.0f} kB ({page['file_bytes'] / 1e3:.0f} of files); "
-        f"load of the machine {found['load']:.1f}\n"
+    found = asyncio.run(measured())
+    table = found["rows"]
+    crowd, alone = table[CROWD], [table[name] for name in ("without a page", "without a page again")]
+    what = f"{RANGERS} rangers, {CLIENTS} clients, one of them stuck"
+    p99 = float(np.mean([row["p99_ms"] for row in alone]))
+    off = abs(alone[0]["p50_ms"] - alone[1]["p50_ms"]) / np.mean([row["p50_ms"] for row in alone])
+    yield Row(
+        path="dashboard, the site's buffer to durable beside it",
+        what=what,
+        ours_s=1e-3 * crowd["p50_ms"],
+        beside={"no dashboard": 1e-3 * float(np.mean([row["p50_ms"] for row in alone]))},
+        limit_s=None,
+        spread=float(off),
+        note=f"99 of 100 within {crowd['p99_ms']:.0f} ms, without within {p99:.0f} ms; near 1 is good; "
+        "spread: before and after",
+    )
+    events = crowd["events_a_second_a_client"] * (CLIENTS - 1)
+    yield Row(
+        path="dashboard, processor time of an event to a client",
+        what=what,
+        ours_s=1e-2 * crowd["page_percent"] / events,
+        beside={},
+        limit_s=None,
+        spread=0.0,
+        note=f"{crowd['page_percent']:.0f} % of a core for {events:.0f} events a second, "
+        f"{crowd['bytes_a_second_a_client'] / 1e3:.1f} kB/s a client, {crowd['page_mb']:.0f} MB; nobody looking "
+        f"{table['nobody looks']['page_percent']:.1f} % of a core",
+    )
+    first = found["first_page"]
+    total = first["file_bytes"] + sum(first["answer_bytes"].values())
+    yield Row(
+        path="dashboard, first page",
+        what="all that a browser asks for before it shows the site",
+        ours_s=first["seconds"],
+        beside={},
+        limit_s=None,
+        spread=0.0,
+        note=f"{total / 1e3:.0f} kB, {first['file_bytes'] / 1e3:.0f} of them files; one visit",
     )
 
 
+def lasting(minutes):
+    """Print the page's memory over so many minutes."""
+    memory, counts = asyncio.run(memory_over(minutes, clients=CLIENTS))
+    by_minute = ", ".join(f"{mb:.2f}" for mb in memory[:: round(60.0 / LOOK)])
+    sys.stdout.write(f"memory each minute, MB: {by_minute}\ngrowth {growth_of(memory):.2f} MB; {counts}\n")
+
+
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["--lasting"]:
+        lasting(float(sys.argv[2]))
+    else:
+        main(rows)

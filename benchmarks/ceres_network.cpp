@@ -4,14 +4,14 @@
 // PROBLEM: int64 stations, targets, ranges, parameters a station (3, or 5: x y z zero scale), stations with a prior;
 //   then doubles stations (S, 3), targets (T, 3); int64 station (m), target (m); doubles distance (m), root weight (m);
 //   then, of each prior, int64 station (k); doubles value (k, 3), root weight (k) of each coordinate.
-// Writes the answer, stations (S, p) and targets (T, 3), as doubles, and prints a line a round: seconds in Solve alone,
-// steps, final sum of squares. The first trust region is so large that the steps are those of Gauss-Newton.
+// Writes the answer, stations (S, p) and targets (T, 3), as doubles, and prints a line a round: processor seconds in
+// Solve alone, steps, final sum of squares. The first trust region is so large that the steps are those of Gauss-Newton.
 
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <vector>
 
@@ -94,10 +94,10 @@ void solve(const Network& n, std::vector<double>& x, std::vector<double>& t) {
   options.function_tolerance = 1e-9;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   ceres::Solve(options, &problem, &summary);
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-  std::printf("%.9f %d %.9f\n", taken.count(), summary.num_successful_steps, 2.0 * summary.final_cost);
+  const double taken = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  std::printf("%.9f %d %.9f\n", taken, summary.num_successful_steps, 2.0 * summary.final_cost);
 }
 
 int main(int argc, char** argv) {

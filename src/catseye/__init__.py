@@ -40,7 +40,10 @@ if TYPE_CHECKING:
     from catseye.api.positions import locate
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
+    from catseye.api.scale.archive import archive, restore
     from catseye.api.scale.design import design
+    from catseye.api.scale.many import reduce_nights
+    from catseye.api.scale.query import query
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
@@ -74,7 +77,10 @@ FACE = {  # file of catseye.api -> its exported names
     "positions": ("locate",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
+    "scale.archive": ("archive", "restore"),
     "scale.design": ("design",),
+    "scale.many": ("reduce_nights",),
+    "scale.query": ("query",),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
@@ -93,6 +99,7 @@ __all__ = [
     "acoustic",
     "adjust",
     "air",
+    "archive",
     "backup_journal",
     "baseline",
     "beam",
@@ -123,10 +130,13 @@ __all__ = [
     "point",
     "pose",
     "predict_pointing",
+    "query",
     "reduce",
+    "reduce_nights",
     "refractometer",
     "replay",
     "report_of",
+    "restore",
     "safety",
     "save",
     "save_triplet_form",

@@ -661,6 +661,18 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1137/1.9780898717921",
         used="least squares with Gaussian priors",
     ),
+    "LEDOIT02": Source(
+        title="O. Ledoit and M. Wolf, Some hypothesis tests for the covariance matrix when the dimension is large "
+        "compared to the sample size, Annals of Statistics 30, 2002",
+        locator="doi:10.1214/aos/1031689018",
+        used="proposition 7: test of a sample covariance against the identity",
+    ),
+    "JOHNSTONE01": Source(
+        title="I. M. Johnstone, On the distribution of the largest eigenvalue in principal components analysis, "
+        "Annals of Statistics 29, 2001",
+        locator="doi:10.1214/aos/1009210544",
+        used="theorem 1.1: centre and width of the largest eigenvalue of a white sample covariance",
+    ),
     "GEYER92": Source(
         title="C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7, 1992",
         locator="doi:10.1214/ss/1177011137",

@@ -183,9 +183,27 @@ def test_a_plan_says_what_a_network_is_worth_and_what_to_measure_next(answered, 
     assert found["best_next"]["mean_u"] < found["mean_u"]
     assert max(step["at_s"] for step in found["schedule"]) <= 20.0
     assert found["monte_carlo"]["runs"] == 5
+    test = found["monte_carlo"]["covariance"]
+    assert (test["combinations"], test["degrees_of_freedom"]) == (66, 66 * 67 // 2)
+    assert test["agrees"] == (min(test["p"], test["p_size"]) >= 1e-3)
+    assert 0.0 < test["largest"] < test["by_chance"]
     assert all(row["residual"] is None and row["mdb"] > 0.0 for row in found["observations"])
     aimed = answered("plan", EXAMPLES / "feed-arm.toml", "--interest", "ZY113")
     assert aimed["interest"] == ["ZY113"]
+
+
+def test_a_plan_says_whether_its_runs_scatter_as_their_covariance_claims(catseye, tmp_path):
+    options = ["plan", EXAMPLES / "feed-arm.toml", "--runs", "300"]
+    status, said, complaint = catseye(*options, "--processes", "1", "--out", tmp_path / "report")
+    assert (status, complaint) == (0, "")
+    said = " ".join(said.split())
+    assert "300 runs, 300 of them with an answer" in said
+    assert "over 66 independent combinations of the coordinates: their covariance agrees with the predicted" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+    assert "their covariance agrees with the predicted one" in (tmp_path / "report" / "report.html").read_text()
+    wrong = " ".join(catseye(*options, "--station-ppm", "5", "--air-ppm", "5")[1].split())
+    assert "their covariance contradicts the predicted one (p < 0.0001 for its shape and p < 0.0001" in wrong
+    assert catseye(*options, "--resume")[0] == 2
 
 
 def test_relative_ellipsoids_are_of_the_pairs_asked_for(answered, catseye):

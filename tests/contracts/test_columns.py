@@ -162,7 +162,7 @@ COMMANDS = {  # directory -> the command that writes it; night: of the one befor
     "change": ["surface", "night", "night"],
 }  # fmt: skip
 WITHOUT_TABLES = {"certificate", "plot"}  # commands with --out that write a page or a figure
-ELSEWHERE = {"demo", "export", "structure"}  # `demo` is `reduce`; the others have their tables tested in tests/gateways
+ELSEWHERE = {"demo", "export", "query", "structure"}  # `demo` is `reduce`; others: see tests/gateways
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """`plan`: a network before it is measured."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from catseye.api.network_source import hashes_of, network_of
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.constants import MILLIMETRE
+from catseye.errors import ArgumentError
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from catseye.api.network_source import NetworkSource
     from catseye.gateways.writers.passage import Passage
     from catseye.gateways.writers.report import ResultReport
-    from catseye.reduction.network.plan import PlannedNetwork
+    from catseye.reduction.network.plan import Chunk, PlannedNetwork
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,10 +33,12 @@ class PlanResult(Result):
 
     planned   the recipe's answer: weak directions, worth of observations, candidates, schedule, Monte Carlo
     path      that was read; None where a network or arrays were given
+    ledger    of the Monte Carlo, no longer needed once this is saved
     """
 
     planned: "PlannedNetwork"
     path: Path | None
+    ledger: Path | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -99,10 +103,14 @@ class PlanResult(Result):
         return plan_report(self.planned, when, self.inputs())
 
     def write(self, directory: Path, progress: Progress | None = None) -> None:
-        """Write the files of `catseye plan --out`."""
+        """Write the files of `catseye plan --out`, and remove the ledger of the Monte Carlo."""
         from catseye.gateways.network.plan import write_plan
 
         write_plan(self.planned, directory, self.inputs(), progress=progress)
+        if self.ledger is not None:
+            from catseye.service.many.ledger import remove
+
+            remove(self.ledger)
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of the network's file or tables."""
@@ -130,6 +138,10 @@ def plan(
     blunders_percent: Annotated[Any, In("percent", one=True)] = 0.0,
     sigma_mm: Annotated[Any, In("mm", one=True)] = None,
     sigma_ppm: Annotated[Any, In("ppm", one=True)] = None,
+    processes: Annotated[Any, In("", whole=True)] = None,
+    cluster: str | None = None,
+    resume: bool = False,
+    ledger: "str | os.PathLike[str] | None" = None,
     progress: Progress | None = None,
 ) -> PlanResult:
     """Predicted quality of a network, and best further ranges.
@@ -146,12 +158,20 @@ def plan(
     refraction             spread of the coefficient k of refraction (1 sigma)
     blunders_percent       share of gross errors, which are then searched for and left out
     sigma_mm, sigma_ppm    as for `adjust`
+    processes  for the runs, of one thread each; None: as many as cores are free, and none for runs of a few seconds
+    cluster    "local" or a dask scheduler's address or file, for the runs; None: this machine
+    resume     take from the ledger what an earlier call did of the same runs
+    ledger     folder of what is done of the runs; `save` removes it. None: nothing stays
     progress   called with (what, done, of how many)
 
-    Raises InputError for a file that cannot be used and EstimationError where the network floats.
+    The runs are the same on any number of processes, to the last bit. Raises InputError for a file that cannot be used,
+    EstimationError where the network floats, and StoppedError where the disk is full or the cluster is lost.
     """
     from catseye.reduction.network.plan import MonteCarloOptions, PlanOptions, planned
 
+    if resume and ledger is None:
+        raise ArgumentError("resume needs ledger: the folder of an earlier call", "resume", "ledger")
+    place = None if ledger is None else Path(ledger)
     read, path = network_of(network, sigma_mm, sigma_ppm, planned=True)
     monte_carlo = MonteCarloOptions(
         runs=runs,
@@ -164,5 +184,12 @@ def plan(
     options = PlanOptions(
         datum=datum, interest=interest, budget_s=budget_s, shot_s=shot_s, most=most, monte_carlo=monte_carlo
     )
-    found = planned(read, options, progress=progress)
-    return PlanResult(verdict=found.verdict, planned=found, path=path)
+
+    def run(chunks: "Sequence[Chunk]") -> list[dict[str, Any]]:
+        from catseye.service.many.chunks import run_chunks
+
+        return run_chunks(chunks, ledger=place, resume=resume, processes=processes, cluster=cluster, progress=progress)
+
+    apart = processes is not None or cluster is not None
+    found = planned(read, options, run=run, apart=apart, progress=progress)
+    return PlanResult(verdict=found.verdict, planned=found, path=path, ledger=place)

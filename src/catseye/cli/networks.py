@@ -1,5 +1,7 @@
 """The commands of networks: adjust, plan."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -8,6 +10,7 @@ import typer
 from catseye.cli.commands import Json, Quiet, Threads, app
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
+from catseye.cli.many_options import Several, progress_of_many
 from catseye.cli.terminal import ProgressLine, say
 from catseye.cli.vocabularies import COMPONENTS, DATUMS, NETWORK_WEIGHTS, one_of
 
@@ -222,7 +225,8 @@ class _MonteCarlo(NamedTuple):
     ] = 0.0
 
 
-@app.command(epilog="\b\nExample: catseye plan networks/feed-arm.toml --budget-s 600 --shot-s 5")
+@app.command(epilog="\b\nExamples: catseye plan networks/feed-arm.toml --budget-s 600 --shot-s 5\n"
+             "          catseye plan networks/feed-arm.toml --runs 10000 --out feed-arm-plan")  # fmt: skip
 @grouped
 def plan(  # noqa: PLR0913 - its options are its command line
     *,
@@ -230,6 +234,7 @@ def plan(  # noqa: PLR0913 - its options are its command line
     datum: Datum = None,
     further: _Further,
     monte_carlo: _MonteCarlo,
+    several: Several,
     claim: _Claim,
     out: Out = None,
     threads: Threads = None,
@@ -241,19 +246,37 @@ def plan(  # noqa: PLR0913 - its options are its command line
     from catseye.api.planning import plan as planned
     from catseye.api.result import require_writable
 
+    if several.resume and out is None:
+        raise typer.BadParameter("needs --out, beside which the earlier runs are.", param_hint="'--resume'")
     require_writable(out, network)
-    progress = ProgressLine(quiet)
-    try:
-        interest = _names(further.interest)
-        options: dict[str, Any] = {
-            **further._asdict(),
-            **monte_carlo._asdict(),
-            **claim._asdict(),
-            "interest": interest,
-        }
+    ledger = None if out is None else out.with_name(f"{out.name}.ledger")
+    options: dict[str, Any] = {
+        **further._asdict(),
+        **monte_carlo._asdict(),
+        **several._asdict(),
+        **claim._asdict(),
+        "interest": _names(further.interest),
+        "ledger": ledger,
+    }
+    with _progress_of(monte_carlo.runs, quiet=quiet, resumable=ledger is not None) as progress:
         result = planned(network, datum=datum, progress=progress, **options)
+    try:
         _save(result, out, progress)
     finally:
         progress.clear()
     files = _written(out, "points.csv, candidates.csv, plan.json")
     tell(result, json=json, quiet=quiet, strict=strict, written=files)
+
+
+@contextmanager
+def _progress_of(runs: int, *, quiet: bool, resumable: bool) -> Iterator[ProgressLine]:
+    """Progress line of a plan, which tells of its Monte Carlo runs when it is interrupted."""
+    if runs:
+        with progress_of_many("run", quiet=quiet, resumable=resumable) as line:
+            yield line
+        return
+    line = ProgressLine(quiet)
+    try:
+        yield line
+    finally:
+        line.clear()

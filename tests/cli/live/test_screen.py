@@ -35,7 +35,10 @@ if job == 0:
     signal.signal(signal.SIGTTOU, signal.SIG_DFL)
     os.dup2(2, 1)
     os.execv(sys.argv[1], sys.argv[1:])
-os.setpgid(job, job)
+try:
+    os.setpgid(job, job)
+except PermissionError:
+    pass  # it runs the command already, in the group that it made itself
 while True:
     _, status = os.waitpid(job, os.WUNTRACED)
     os.tcsetpgrp(0, os.getpgrp())

@@ -8,10 +8,8 @@ import pytest
 
 from catseye.errors import EstimationError
 from catseye.estimation.network.adjustment import adjust_network
-from catseye.estimation.network.model import NetworkParameter, NetworkPoints, ObservationNetwork
-from catseye.estimation.network.monte_carlo import Disturbance, measured, scatter
+from catseye.estimation.network.model import NetworkParameter
 from catseye.estimation.network.plan import plan, predicted, schedule
-from catseye.estimation.observations.kinds import Vectors, ZenithAngles
 
 
 def mean_u(network, interest):
@@ -128,58 +126,3 @@ def test_floating_plan_names_the_floating_points(ranging_network):
     xyz[3] = np.nan
     with pytest.raises(EstimationError, match="S04: no coordinates"):
         plan(replace(network, points=replace(network.points, xyz=xyz)))
-
-
-def test_measuring_on_paper_scatters_as_predicted(ranging_network):
-    network, _ = ranging_network(9)
-    result = scatter(network, adjust_network, runs=100, seed=1)
-    # 100 runs of 54 coordinates, correlated: the ratio's own standard deviation is some 0.02
-    assert result.ratio == pytest.approx(1.0, abs=0.08)
-    assert result.runs == result.asked == 100
-    assert np.isnan(result.found)
-    assert result.false == 0.0
-
-
-def test_wrong_air_increases_scatter_over_claim(ranging_network):
-    network, _ = ranging_network(10)
-    wrong = scatter(network, adjust_network, runs=30, seed=2, disturbance=Disturbance(common_ppm=3.0))
-    assert wrong.ratio > 1.5
-    drawn, bad = measured(
-        network, network.points.xyz.ravel(), np.random.default_rng(0), disturbance=Disturbance(blunders=0.2)
-    )
-    assert 3 <= bad[0].sum() <= 30
-    off = np.abs(drawn.groups[0].observed - network.groups[0].predict(network.points.xyz.ravel())[0])
-    assert off[bad[0]].min() > 15 * 5e-5
-    assert off[~bad[0]].max() < 5 * 5e-5
-
-
-def test_refraction_lifts_targets_by_its_square_of_distance():
-    true = np.array([[0.0, 0.0, 0.0], [300.0, 400.0, 20.0]])
-    zenith = ZenithAngles("z", np.zeros(1), np.full(1, 1e-30), np.array([0]), np.array([3]))
-    fixed = np.zeros((2, 3), dtype=bool)
-    network = ObservationNetwork(NetworkPoints(("A", "B"), true, fixed, fixed), (), (zenith,))
-    draws = [
-        measured(network, true.ravel(), np.random.default_rng(seed), disturbance=Disturbance(refraction=0.2))[0]
-        .groups[0]
-        .observed
-        for seed in range(400)
-    ]
-    k = (zenith.predict(true.ravel())[0] - np.ravel(draws)) * 2 * 6_371_000.0 / 500.0  # k > 0 lifts: the angle shrinks
-    assert np.std(k) == pytest.approx(0.2, rel=0.15)
-    assert np.corrcoef(k, [np.random.default_rng(s).standard_normal(4)[3] for s in range(400)])[0, 1] > 0.99
-
-
-def test_correlated_observations_are_drawn_with_their_correlations():
-    lever = np.array([[1.0, 0.0, 0.0], [0.9, 0.3, 0.0], [-0.5, 0.4, 0.8]])
-    covariance = lever @ lever.T
-    vectors = Vectors("v", np.zeros(6), np.stack([covariance, 4 * covariance]), np.array([0, 0]), np.array([3, 3]))
-    nothing = np.zeros((2, 3), dtype=bool)
-    network = ObservationNetwork(NetworkPoints(("A", "B"), np.zeros((2, 3)), nothing, nothing), (), (vectors,))
-    rng = np.random.default_rng(5)
-    drawn = np.array(
-        [measured(network, np.zeros(6), rng, disturbance=Disturbance())[0].groups[0].observed for _ in range(3000)]
-    )
-    found = np.cov(drawn.T)
-    assert found[:3, :3] == pytest.approx(covariance, abs=0.12)  # four standard deviations of a covariance near 1
-    assert found[3:, 3:] == pytest.approx(4 * covariance, abs=0.48)
-    assert found[:3, 3:] == pytest.approx(np.zeros((3, 3)), abs=0.16)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -120,6 +121,35 @@ def adjust_network(
             solution = _from_observations(solution, active, (inflation, alone), solver)
         return replace(solution, status=diagnosed(solution, _trial if inflation is None else None))
     return solution
+
+
+class FixedParts(NamedTuple):
+    """Parts of a network near its solution that do not depend on the observed values.
+
+    x            (n,) parameters of the solution
+    free         (n,) bool: those that move
+    groups       of the network, then one of priors if there are any
+    conditions   (d, n) of the datum, see `datum_conditions`
+    reference    (n,) of the conditions; nan where no coordinate is given, and for other parameters
+    """
+
+    x: np.ndarray
+    free: np.ndarray
+    groups: list[ObservationGroup]
+    conditions: np.ndarray
+    reference: np.ndarray
+
+
+def fixed_parts(solution: NetworkSolution) -> FixedParts:
+    """Parameters, groups and datum of a solved network."""
+    points = solution.network.points
+    problem = _Problem.of(solution.network, solution)
+    n = points.xyz.size
+    floating = problem._motions([ActiveRows.of(group, None) for group in problem.groups], problem.x0)
+    datum = points.datum & problem.free[:n].reshape(-1, 3) & np.isfinite(points.xyz)
+    conditions, _ = datum_conditions(floating, datum, points.xyz)
+    reference = np.concatenate([points.xyz.ravel(), np.full(len(problem.x0) - n, np.nan)])
+    return FixedParts(problem.x0, problem.free, problem.groups, conditions, reference)
 
 
 def fits_near(

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -97,6 +97,21 @@ class ParaboloidFit:
         return self.deviation_covariance * c[:, None] * c
 
 
+class PlacedParaboloid(NamedTuple):
+    """Fitted paraboloid without covariance; its fields are those of `ParaboloidFit`."""
+
+    free: tuple[str, ...]
+    translation: np.ndarray
+    rotation: np.ndarray
+    focal_length: float
+    local: np.ndarray
+    normal: np.ndarray
+    deviation: np.ndarray
+    cos_incidence: np.ndarray
+    design: np.ndarray
+    gain: np.ndarray
+
+
 def fit_paraboloid(
     points: np.ndarray,
     covariance: np.ndarray | AlongNormals,
@@ -124,6 +139,43 @@ def fit_paraboloid(
     that times cos i = 1 / sqrt(1 + r^2/4f^2). Raises EstimationError for too few points and for points that do not
     determine the parameters.
     """
+    placed = place_paraboloid(points, nominal, focal_length=focal_length, free=free, weights=weights, measure=measure)
+    tilts = nominal.rotation[:, :2]
+    free, normal, design, gain = placed.free, placed.normal, placed.design, placed.gain
+    translation, focal = placed.translation, placed.focal_length
+    along = covariance_along(covariance, normal)
+    expansion = _expansion(free, tilts) @ gain
+    parameters = gain @ along @ gain.T
+    rotation = from_vector(placed.rotation) @ nominal.rotation
+    return ParaboloidFit(
+        translation=translation,
+        rotation=placed.rotation,
+        covariance=expansion @ along @ expansion.T,
+        frame=Transform(nominal.to, nominal.from_, rotation, nominal.translation + translation),
+        local=placed.local,
+        deviation=placed.deviation,
+        deviation_covariance=without(along, design, gain),
+        focal_length=focal,
+        u_focal_length=float(np.sqrt(parameters[-1, -1])) if "focal-length" in free else 0.0,
+        free=free,
+        parameter_covariance=parameters,
+        normal=normal,
+        design=design,
+        gain=gain,
+        along=along,
+    )
+
+
+def place_paraboloid(
+    points: np.ndarray,
+    nominal: Transform,
+    *,
+    focal_length: float,
+    free: Sequence[str] = POSE,
+    weights: np.ndarray | None = None,
+    measure: Measure = "normal",
+) -> PlacedParaboloid:
+    """Least-squares paraboloid without its covariance, as `fit_paraboloid` does it and with its arguments."""
     points = np.asarray(points, dtype=float)
     free = ordered(free)
     k, count = len(points), sum(PARAMETERS[name] for name in free)
@@ -155,27 +207,18 @@ def fit_paraboloid(
             f"the paraboloid did not settle in {ITERATIONS} iterations; last step {step} m, rad",
             reason=ParaboloidStatus.UNSETTLED,
         )
-    local, normal, deviation, _ = _deviation(points, nominal, translation, tilts @ turn, focal)
-    along = covariance_along(covariance, normal)
-    expansion = _expansion(free, tilts) @ gain
-    parameters = gain @ along @ gain.T
-    rotation = from_vector(tilts @ turn) @ nominal.rotation
-    return ParaboloidFit(
+    local, normal, deviation, cos = _deviation(points, nominal, translation, tilts @ turn, focal)
+    return PlacedParaboloid(
+        free=free,
         translation=translation,
         rotation=tilts @ turn,
-        covariance=expansion @ along @ expansion.T,
-        frame=Transform(nominal.to, nominal.from_, rotation, nominal.translation + translation),
-        local=local,
-        deviation=deviation,
-        deviation_covariance=without(along, design, gain),
         focal_length=focal,
-        u_focal_length=float(np.sqrt(parameters[-1, -1])) if "focal-length" in free else 0.0,
-        free=free,
-        parameter_covariance=parameters,
+        local=local,
         normal=normal,
+        deviation=deviation,
+        cos_incidence=cos,
         design=design,
         gain=gain,
-        along=along,
     )
 
 

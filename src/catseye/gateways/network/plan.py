@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from catseye.reduction.network.plan import PlannedNetwork
 from catseye.reduction.network.words import quantity
 
 FORMAT = "catseye-plan-1"
+SMALLEST_P = 1e-4  # that is printed as a number
 
 
 def plan_object(planned: PlannedNetwork) -> dict[str, Any]:
@@ -76,6 +78,7 @@ def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
         "predicted": float(np.sqrt(np.mean(scatter.predicted[free] ** 2))),
         "blunders_found": scatter.found,
         "good_lost": scatter.false,
+        "covariance": {**asdict(scatter.covariance), "agrees": scatter.covariance.agrees},
     }
 
 
@@ -153,7 +156,18 @@ def scatter_words(s: MonteCarloScatter) -> str:
     text += "." if s.ratio < 1.2 else ": the errors added to the claimed noise show."
     if np.isfinite(s.found):
         text += f" {100 * s.found:.1f} % of the gross errors were left out, and {100 * s.false:.2f} % of the good ones."
+    test = s.covariance
+    text += (
+        f" As matrices, over {test.combinations} independent combinations of the coordinates: their covariance "
+        f"{'agrees with' if test.agrees else 'contradicts'} the predicted one (p {_probability(test.p)} for its shape "
+        f"and p {_probability(test.p_size)} for its size); along the worst combination they are {test.largest:.2f} of "
+        f"the claim, where chance alone gives up to {test.by_chance:.2f}."
+    )
     return text
+
+
+def _probability(p: float) -> str:
+    return f"= {p:.2g}" if p >= SMALLEST_P else f"< {SMALLEST_P}"
 
 
 def plan_report(planned: PlannedNetwork, when: datetime, inputs: Mapping[str, str]) -> ResultReport:

@@ -4,13 +4,15 @@ import difflib
 import math
 import re
 from datetime import date
-from typing import Any
-
-from pydantic import ValidationError
+from typing import TYPE_CHECKING, Any
 
 from catseye.constants import DEGREE, ZERO_CELSIUS_K
 from catseye.errors import InputError
-from catseye.records.files.record import Record
+
+if TYPE_CHECKING:  # pydantic takes 0.1 s, and readers of an archive refuse without it
+    from pydantic import ValidationError
+
+    from catseye.records.files.record import Record
 
 MANY = 20  # other invalid keys above which rows of a table are merged
 LONGEST_VALUE = 60  # characters of an invalid value in a message
@@ -69,7 +71,7 @@ def shown(value: object) -> str:
     return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}... ({len(text)} characters)"
 
 
-def explained(problem: ValidationError, document: dict[str, Any], kind: type[Record]) -> str:
+def explained(problem: "ValidationError", document: dict[str, Any], kind: "type[Record]") -> str:
     """First validation error in words, and the names of all other invalid keys.
 
     An unknown version comes first; an unknown key comes before a missing one, which it may explain.
@@ -106,7 +108,7 @@ def placed(loc: tuple[int | str, ...], document: Any) -> tuple[str, str, Any]:
     return path, key, document
 
 
-def worded(error: Any, key: str, parent: Any, kind: type[Record]) -> str:
+def worded(error: Any, key: str, parent: Any, kind: "type[Record]") -> str:
     """Description of an invalid value and of the expected one."""
     name, context, value = error["type"], error.get("ctx", {}), error["input"]
     if name == "missing":

@@ -135,6 +135,19 @@ def adjust_coordinates(
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
     n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
     """
+    settled, resolved = settled_network(campaign, phases, electronics, settings=settings, progress=progress)
+    return coordinates_of(settled, resolved=resolved)
+
+
+def settled_network(
+    campaign: ObservedSite,
+    phases: Phases,
+    electronics: dict[str, ElectronicsPhase],
+    *,
+    settings: ReductionSettings,
+    progress: Progress | None = None,
+) -> tuple[SettledNetwork, Resolved]:
+    """Adjusted network with its covariance, and the cycles resolved beforehand; see `adjust_coordinates`."""
     motion = motion_of(campaign)
     network = build_network(campaign, phases, electronics, settings=settings, motion=motion)
     resolved = resolve_cycles(network, progress)
@@ -155,7 +168,7 @@ def adjust_coordinates(
         ).with_strength(settled.network.strength)
         starts = {name: settled.solution.x[network.layout.columns(name)] for name in network.places}
         settled = iterate_adjustment(network, starts, progress, active=selection_of(settled, network))
-    return coordinates_of(settled, resolved=resolved)
+    return settled, resolved
 
 
 def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCoordinates:

@@ -1,5 +1,6 @@
 """Main recipe: a campaign's samples to coordinates, pose and surface."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from catseye.aliases import Progress
@@ -53,7 +54,11 @@ class Reduction:
 
 
 def reduce_epoch(
-    campaign: Campaign, settings: ReductionSettings | None = None, progress: Progress | None = None
+    campaign: Campaign,
+    settings: ReductionSettings | None = None,
+    progress: Progress | None = None,
+    *,
+    adjusted: Callable[..., AdjustedCoordinates] = adjust_coordinates,
 ) -> Reduction:
     """Coordinates, pose and surface of one campaign.
 
@@ -62,6 +67,7 @@ def reduce_epoch(
     campaign   from `read_campaign`
     settings   assumptions beyond the records (default: those of the layout)
     progress   called with (task, number done, total)
+    adjusted   `adjust_coordinates`, or another function that does the same and more
 
     Raises InputError where nothing can be adjusted and EstimationError where the adjustment finds no answer.
     """
@@ -69,7 +75,7 @@ def reduce_epoch(
     phases = measure_phases(campaign, settings, progress)
     with one_thread():
         electronics, wrong = follow_electronics(campaign, phases, settings.dense_shots)
-        coordinates = adjust_coordinates(campaign, phases, electronics, settings=settings, progress=progress)
+        coordinates = adjusted(campaign, phases, electronics, settings=settings, progress=progress)
         surface, missing = fit_surface(campaign, coordinates)
     reasons = {k: reason for k, reason in enumerate(phases.reason) if reason} | wrong | coordinates.unresolved
     ranges = coordinates.ranges

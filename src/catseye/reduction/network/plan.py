@@ -1,21 +1,34 @@
 """Recipe for a plan: predicted quality, worth of observations, further ranges, Monte Carlo."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from catseye.aliases import Progress
+from catseye.errors import ArgumentError
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
-from catseye.estimation.network.monte_carlo import Disturbance, MonteCarloScatter, scatter
+from catseye.estimation.network.monte_carlo import (
+    Disturbance,
+    MonteCarloScatter,
+    NetworkSimulation,
+    RunSums,
+    chunks,
+    scatter_of,
+    seconds_per_run,
+)
 from catseye.estimation.network.plan import Candidate, Plan, plan, schedule
+from catseye.processors import one_thread
 from catseye.reduction.network.adjusted import AdjustedNetwork, adjusted_network
 from catseye.reduction.network.treatment import AdjustmentOptions, treated
 from catseye.verdict import Verdict
 
 LARGEST_RATIO = 1.2  # largest acceptable departure over claim in the Monte Carlo
+WORTH_PROCESSES_S = 3.0  # s, processor time of a Monte Carlo from which other processes save more than their start
+
+Chunk = tuple[NetworkSimulation, int, int]  # its first run, and their number
+RunChunks = Callable[[Sequence[Chunk]], Sequence[dict[str, object]]]  # `chunk_object` of each
 
 
 @dataclass(frozen=True)
@@ -28,6 +41,8 @@ class MonteCarloOptions:
     station_ppm  the same for each ranger
     refraction   standard deviation of the coefficient of vertical refraction
     blunders     share of gross errors of 20 standard uncertainties; with them, wrong observations are rejected
+
+    Raises ArgumentError for a negative number of runs or seed.
     """
 
     runs: int = 0
@@ -36,6 +51,11 @@ class MonteCarloOptions:
     station_ppm: float = 0.0
     refraction: float = 0.0
     blunders: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("runs", self.runs), ("seed", self.seed)):
+            if value < 0:
+                raise ArgumentError(f"{name} = {value} is invalid (expected 0 or more)", name)
 
 
 @dataclass(frozen=True)
@@ -94,12 +114,18 @@ class PlannedNetwork:
 
 
 def planned(
-    network: ObservationNetwork, options: PlanOptions | None = None, *, progress: Progress | None = None
+    network: ObservationNetwork,
+    options: PlanOptions | None = None,
+    *,
+    run: RunChunks | None = None,
+    apart: bool = False,
+    progress: Progress | None = None,
 ) -> PlannedNetwork:
     """Network before it is measured.
 
     network    observed values are not used
     options    points of interest, time, Monte Carlo
+    run, apart   as for `monte_carlo_scatter`
     progress   called with (what, done, of how many)
 
     Raises EstimationError where the network floats.
@@ -111,7 +137,7 @@ def planned(
         picked = schedule(found, budget_s=options.budget_s, shot_s=options.shot_s)
     drawn = None
     if options.monte_carlo.runs:
-        drawn = monte_carlo_scatter(found.solution.network, options.monte_carlo, progress=progress)
+        drawn = monte_carlo_scatter(found.solution, options.monte_carlo, run=run, apart=apart, progress=progress)
     return PlannedNetwork(adjusted_network(found.solution), found, picked, drawn)
 
 
@@ -128,28 +154,70 @@ def _verdict(planned: PlannedNetwork) -> Verdict:
     if planned.scatter is not None and planned.scatter.ratio > LARGEST_RATIO:
         ratio = planned.scatter.ratio
         return Verdict("doubtful", f"in the Monte Carlo the departures are {ratio:.2f} times the claimed uncertainties")
+    if planned.scatter is not None and planned.scatter.covariance.excess > LARGEST_RATIO:
+        test = planned.scatter.covariance
+        return Verdict(
+            "doubtful",
+            f"in the Monte Carlo the departures along one combination of the coordinates are {test.largest:.2f} times "
+            f"the claim (by chance up to {test.by_chance:.2f})",
+        )
     return Verdict("good", "every point would be determined and every observation checked by others")
 
 
 def monte_carlo_scatter(
-    network: ObservationNetwork, monte_carlo: MonteCarloOptions, *, progress: Progress | None = None
+    solution: NetworkSolution,
+    monte_carlo: MonteCarloOptions,
+    *,
+    run: RunChunks | None = None,
+    apart: bool = False,
+    progress: Progress | None = None,
 ) -> MonteCarloScatter:
-    """Monte Carlo simulation of a planned network; see `scatter`.
+    """Monte Carlo simulation of a planned network, measured many times with external errors and adjusted each time.
 
-    It is measured many times with external errors, and adjusted each time.
-
-    network       with its datum as it will be; its coordinates are the truth
+    solution      of the network with its predicted observations; its coordinates are the truth
     monte_carlo   number of simulations and their errors
+    run           runs chunks elsewhere; None: here, one after the other
+    apart         True: elsewhere, however short
     progress      called with (what, done, of how many)
+
+    The result depends on the options and the network, not on where or in which order chunks run. Raises
+    EstimationError when no run converges.
     """
     o = monte_carlo
     disturbance = Disturbance(
         common_ppm=o.air_ppm, station_ppm=o.station_ppm, refraction=o.refraction, blunders=o.blunders
     )
-    options = AdjustmentOptions(reject=o.blunders > 0.0)
+    simulation = NetworkSimulation.of(solution, seed=o.seed, disturbance=disturbance)
+    parts = chunks(simulation, o.runs)
+    if run is not None and (apart or o.runs * seconds_per_run(simulation) > WORTH_PROCESSES_S):
+        found = [RunSums.from_object(content) for content in run([(simulation, *part) for part in parts])]
+    else:
+        found = [_chunk_sums(simulation, *part, progress=_part_of(progress, part[0], o.runs)) for part in parts]
+    return scatter_of(simulation, sum(found[1:], found[0]))
+
+
+def chunk_object(simulation: NetworkSimulation, first: int, count: int) -> dict[str, object]:
+    """Sums over some runs as an object for JSON, computed in any process.
+
+    simulation   of a network
+    first        run
+    count        of runs
+    """
+    return _chunk_sums(simulation, first, count).to_object()
+
+
+def _chunk_sums(simulation: NetworkSimulation, first: int, count: int, *, progress: Progress | None = None) -> RunSums:
+    options = AdjustmentOptions(reject=simulation.disturbance.blunders > 0.0)
 
     def solve(drawn: ObservationNetwork) -> NetworkSolution:
         return treated(drawn, options)[0]
 
-    with threadpool_limits(limits=1, user_api="blas"):  # spinning pools make small matrices many times slower
-        return scatter(network, solve, runs=o.runs, seed=o.seed, disturbance=disturbance, progress=progress)
+    with one_thread():  # spinning pools make small matrices many times slower
+        return simulation.run(first, count, solve, progress)
+
+
+def _part_of(progress: Progress | None, before: int, runs: int) -> Progress | None:
+    """Progress over all runs, of a chunk that begins after some."""
+    if progress is None:
+        return None
+    return lambda what, done, _: progress(what, before + done, runs)

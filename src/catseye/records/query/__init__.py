@@ -1,0 +1,1 @@
+"""Rows of an archive by DuckDB: a few of many, and plain SQL."""

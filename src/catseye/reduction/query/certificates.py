@@ -1,0 +1,99 @@
+"""Certificates that a night's result stood on, and whether they were valid then."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from catseye.errors import InputError
+from catseye.reduction.query.span import ArchiveSpan, several
+from catseye.verdict import Verdict
+
+
+class Validity(Enum):
+    """Validity of a certificate on the night; the value is the word of tables."""
+
+    VALID = "valid"
+    EXPIRED = "expired"
+    LATER = "measured later"
+    UNLIMITED = "no end stated"
+
+
+@dataclass(frozen=True, eq=False)
+class NightCertificates:
+    """Certificates of one night, n of them.
+
+    night, mjd       identifier, and UTC
+    instrument       (n,) name of the record
+    kind, file       (n,) kind of the record, and its file in the campaign
+    sha256           (n,) of that file
+    valid_from, valid_until   (n,) MJD; nan where not stated
+    value, u, unit   (n,) main value of the record; nan without one
+    validity         (n,) on the night
+    """
+
+    night: str
+    mjd: float
+    verdict: Verdict
+    instrument: np.ndarray
+    kind: np.ndarray
+    file: np.ndarray
+    sha256: np.ndarray
+    valid_from: np.ndarray
+    valid_until: np.ndarray
+    value: np.ndarray
+    u: np.ndarray
+    unit: np.ndarray
+    validity: tuple[Validity, ...]
+
+    @property
+    def left(self) -> np.ndarray:
+        """Days from the night to the end of the last valid day, (n,); nan where no end is stated."""
+        return np.floor(self.valid_until) + 1.0 - self.mjd
+
+
+def night_certificates(span: ArchiveSpan, night: str) -> NightCertificates:
+    """Certificates of a night, by its identifier or a beginning that only one has.
+
+    Raises InputError: an unknown night, or one without certificates.
+    """
+    name = span.archive.entry(night).night
+    columns = (
+        *("instrument", "kind", "file", "sha256", "valid_from", "valid_until"),
+        *("value", "u", "unit"),
+    )
+    rows = ArchiveSpan(span.archive).table("certificates", "mjd", *columns, night=name)
+    if not len(rows["mjd"]):
+        raise InputError(f"{span.archive.directory}: night {name} has no certificates (expected those of its records)")
+    mjd = float(rows.pop("mjd")[0])
+    validity = tuple(
+        _validity(mjd, start, end)
+        for start, end in zip(rows["valid_from"].tolist(), rows["valid_until"].tolist(), strict=True)
+    )
+    return NightCertificates(
+        night=name, mjd=mjd, verdict=_judged(rows["instrument"].tolist(), validity), validity=validity, **rows
+    )
+
+
+def _validity(mjd: float, start: float, end: float) -> Validity:
+    """Validity at a time; the last day itself is valid, and nan states nothing."""
+    if np.floor(start) > np.floor(mjd):  # a date has no hour; False for nan
+        return Validity.LATER
+    if np.isnan(end):
+        return Validity.UNLIMITED
+    return Validity.VALID if mjd < np.floor(end) + 1.0 else Validity.EXPIRED
+
+
+def _judged(instruments: list[str], validity: tuple[Validity, ...]) -> Verdict:
+    bad = [
+        (name, each)
+        for name, each in zip(instruments, validity, strict=True)
+        if each in (Validity.EXPIRED, Validity.LATER)
+    ]
+    if not bad:
+        return Verdict("good", f"{several(len(instruments), 'certificate')}, all of them valid on the night")
+    name, each = bad[0]
+    return Verdict(
+        "doubtful",
+        f"{len(bad)} of {several(len(instruments), 'certificate')} not valid on the night, first {name} ({each.value})",
+    )
