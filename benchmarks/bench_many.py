@@ -177,7 +177,7 @@ def compared(nights: Sequence[Path], place: Path, what: str) -> None:
         failed = len(many.failures)
         sizes = f"{memory.together / GIB:.2f} GiB together, {memory.one / GIB:.2f} GiB of one"
         say(
-            f"    {name:<22} {wall:8.1f} s, {first / wall:.2f} times one worker; {cpu:.1f} s of processors; {sizes}"
+            f"    {name:<22} {wall:8.1f} s, {first / wall:.2f} times one worker; {f'{cpu:.1f} s' if cpu else 'uncounted s'} of processors; {sizes}"
             + (f"; {failed} FAILED: {many.failures[0].why}" if failed else "")
         )
         rmtree(place / "out")

@@ -126,7 +126,7 @@ class ClusterWorkers:
         raise ArgumentError(f"cluster = {address!r}: is no address and no file ({EXPECTED})", "cluster")
 
     def start(self, number: int, unit: Unit) -> None:
-        """Submit a unit."""
+        """Submit a unit; its answer comes by `ended`."""
         future = self._client.submit(
             perform_remotely, unit, self._ledger, __version__, key=f"{unit.name}-{uuid.uuid4().hex}", pure=False
         )
