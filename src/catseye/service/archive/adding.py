@@ -41,8 +41,8 @@ def change_archive(
 
     directory   of the archive; new or empty where there are sources
 
-    Raises InputError: a missing package or an invalid source, before anything is written; another process that writes to the archive; a
-    night to be removed that is not there; a full disk.
+    Raises InputError: a missing package or an invalid source, before anything is written; another process that writes
+    to the archive; a night to be removed that is not there; a full disk.
     """
     from catseye.gateways.archive.files import create_archive, sole_writer
     from catseye.gateways.archive.joining import drop_nights, join_years, superseded
