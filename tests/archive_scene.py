@@ -1,11 +1,12 @@
 """Archives to try: a simulated year of nights, with a truth that is known, and damage done to files."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from catseye.gateways.archive.content import NightContent
 from catseye.gateways.archive.files import create_archive, sole_writer
+from catseye.gateways.archive.joining import join_years
 from catseye.gateways.archive.writer import write_night
 from catseye.records.archive.reading import open_archive
 
@@ -249,6 +250,7 @@ def _certificates(common, mjd):
         "value": 0.0,
         "u": 1e-3,
         "unit": "m",
+        "ranger": RANGERS,
     }
     return _broadcast(columns, len(RANGERS))
 
@@ -276,3 +278,30 @@ def flip(path, where, bit=0):
     content = bytearray(path.read_bytes())
     content[where] ^= 1 << bit
     path.write_bytes(content)
+
+
+def small_archive(directory, source):
+    """Archive of two nights of 2026, their tables joined, and one of 2027 with samples and inputs.
+
+    source   folder to be made: the inputs of the last
+    """
+    first, second, third = year_contents(3, 3, seed=9, truth=YearTruth(start=61041.0 + 363.15), residuals=2)
+    (source / "mirrors").mkdir(parents=True)
+    np.save(source / "frames.npy", small_samples())
+    (source / "site.toml").write_text('name = "small"\n', encoding="utf-8")
+    (source / "mirrors/ZP101.toml").write_text('zp = "ZP101"\n', encoding="utf-8")
+    inputs = {"directory": source, "inputs": ("frames.npy", "mirrors/ZP101.toml", "site.toml"), "samples": "frames.npy"}
+    rows = len(small_samples())
+    create_archive(directory)
+    with sole_writer(directory):
+        for content in (first, second):
+            write_night(directory, content)
+        join_years(directory)
+        write_night(directory, replace(third, **inputs, periods=np.full(rows, 8), cycles=np.full(rows, 5)))
+    return open_archive(directory)
+
+
+def small_samples():
+    """Rows of 5 cycles of 8 samples, and 3 samples more."""
+    rng = np.random.default_rng(9)
+    return np.rint(9000 * np.sin(np.pi * np.arange(43) / 4) + rng.normal(0, 50, (70, 43))).astype(np.int16)

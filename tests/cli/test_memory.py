@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from catseye.cli.terminal import attempt
-from catseye.memory import is_memory_error, killed_process_message, out_of_memory
+from catseye.memory import available, is_memory_error, killed_process_message, out_of_memory
 from process_scene import ends_with_us
 
 GIB = 2**30
@@ -107,3 +107,11 @@ def test_the_limit_is_told():
         rb"by ulimit -v or prlimit --as\), at least 3\.\d GiB in all \(.*\)\n",
         done.stderr,
     )
+
+
+def test_available_memory_is_what_the_system_and_its_limits_leave(monkeypatch):
+    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+    everything = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    assert 0 < available() <= everything
+    monkeypatch.setattr(resource, "getrlimit", lambda what: (2**28, soft))
+    assert available() <= 2**28

@@ -124,3 +124,20 @@ def test_a_passage_hangs_under_its_title():
     assert lines[0].startswith("The air       word")
     assert all(line.startswith(" " * 14 + "word") for line in lines[1:])
     assert max(map(len, lines)) <= 100
+
+
+def test_a_step_of_slow_parts_keeps_its_estimate_between_them(monkeypatch):
+    """Nights take a minute each: whoever waits for the third of twelve wants to know until when."""
+    clock = [100.0]
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr("sys.stderr", io.StringIO())
+    progress = ProgressLine(quiet=False)
+    monkeypatch.setattr(progress, "_beat", threading.Thread())  # none
+    progress("reducing nights", 0, 12)
+    for done, now in ((1, 160.0), (2, 220.0)):
+        clock[0] = now
+        progress("reducing nights", done, 12)
+    assert progress._left(220.0, 2, 12) == ", 2 min 0 s, some 10 min 0 s left"
+    assert progress._left(250.0, 2, 12) == ", 2 min 30 s, some 9 min 30 s left"
+    assert progress._left(401.0, 2, 12) == ", for 3 min 1 s"  # thrice as long as one took
+    assert progress.counts == (2, 12)

@@ -9,8 +9,8 @@ import venv
 
 import pytest
 
+from contracts.wheel_scene import built, run_there, unpacked
 from repository import ROOT
-from wheel_scene import built, run_there, unpacked
 
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 SERVING = ("serve", "view")  # until Ctrl-C: tests/cli/live and tests/browser try them

@@ -92,6 +92,7 @@ def test_every_file_kept_here_is_tested():
     elsewhere = {
         "frames-1.npy",
         "network-1.toml",
+        "archive-1",  # tests/records/archive/test_frozen.py
         "journal-1.db",
         "journal-2.db",
     }  # test_network_toml, test_journal_reader

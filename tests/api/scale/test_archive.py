@@ -1,6 +1,7 @@
 """`catseye.archive` and `catseye.restore`: what they answer, and what they refuse."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -111,3 +112,12 @@ def test_archives_made_apart_are_equal(tmp_path):
     files = {path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file()}
     differ = {f.parts[0] for f in files if (tmp_path / "a" / f).read_bytes() != (tmp_path / "b" / f).read_bytes()}
     assert differ <= {"nights", "index"}
+
+
+@pytest.mark.parametrize("package", ["pyarrow", "blosc2"])
+def test_a_missing_package_is_one_line_before_anything_is_written(tmp_path, monkeypatch, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    expected = r"\(expected catseye installed with its extra: pip install 'catseye\[scale\]'\)"
+    with pytest.raises(catseye.InputError, match=rf"^archive needs {package} {expected}$"):
+        catseye.archive(tmp_path / "a", "night-01")
+    assert not (tmp_path / "a").exists()

@@ -120,3 +120,12 @@ def test_a_pool_that_the_caller_made_smaller_stays_so(monkeypatch):
             assert pool() == 1
     with threadpool_limits(limits=2, user_api="blas"), one_thread(), one_thread():
         assert (threads(), pool()) == (2, 1)
+
+
+@pytest.mark.parametrize(("cores", "idle", "wanted"), [(8, 60.0, 6), (8, 0.0, 1), (2, 17.0, 2), (2, 16.0, 1)])
+def test_processes_of_one_thread_are_as_many_as_free_cores(monkeypatch, cores, idle, wanted):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")  # of one process, whatever the number of processes
+    load = Busy(cores, idle, 0.0)
+    monkeypatch.setattr(processors, "LOAD", load)
+    monkeypatch.setattr(processors, "allowed", lambda: (load.cores, load.share))
+    assert processors.free_cores() == wanted

@@ -237,7 +237,7 @@ class RestoreResult(Result):
         }
 
     def tables(self) -> "dict[str, QTable]":
-        """`night`: one row."""
+        """`night`: a row with its files and bytes."""
         row = {"night": ([self.night], ""), "files": ([self.files], ""), "size": ([self.size], "byte")}
         return {"night": quantities(row)}
 

@@ -88,7 +88,7 @@ def write_file(
             raise InputError(f"{where}: cannot be written: {problem.strerror or problem}") from problem
         finally:
             fresh.unlink(missing_ok=True)
-    return ArchivedFile(str(path), kind, size, digest, footer, rows)
+    return ArchivedFile(path=str(path), kind=kind, size=size, sha256=digest, footer=footer, rows=rows)
 
 
 def write_text(directory: Path, path: PurePosixPath, text: str, *, kind: str = "") -> ArchivedFile:

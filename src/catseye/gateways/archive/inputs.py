@@ -15,17 +15,18 @@ from catseye.records.archive.provenance import InputFile
 
 
 def files_below(directory: Path) -> list[str]:
-    """Paths of all files below a directory, relative to it, sorted; links are followed.
+    """Paths of all files below a directory, relative to it, sorted; links to files are followed.
 
-    Raises InputError: a directory or file that cannot be read.
+    Raises InputError: a directory that cannot be read, a link to a folder, a file of another kind.
     """
     paths: list[str] = []
 
     def refuse(problem: OSError) -> None:
         raise InputError(f"{problem.filename}: cannot be read: {problem.strerror}") from problem
 
-    for folder, _, names in os.walk(directory, onerror=refuse):
-        for path in (Path(folder) / name for name in names):
+    for folder, folders, names in os.walk(directory, onerror=refuse):
+        links = [name for name in folders if (Path(folder) / name).is_symlink()]
+        for path in (Path(folder) / name for name in (*names, *links)):
             if not path.is_file():
                 raise InputError(f"{path}: is no file (expected files and folders in a campaign)")
             paths.append(path.relative_to(directory).as_posix())

@@ -299,7 +299,7 @@ def _digest(solutions: Sequence[EpochSolution]) -> str:
 
 
 def _conditions(reads: Sequence[LiveWeather]) -> dict[str, float]:
-    """Mean weather."""
+    """Mean weather over all readings."""
     names = ("temperature_c", "pressure_hpa", "humidity_percent")
     return {name: _mean([getattr(read, name) for read in reads]) for name in names}
 

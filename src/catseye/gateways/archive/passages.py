@@ -13,7 +13,7 @@ SHARES = {"tables": tuple(TABLES), "samples": (SAMPLES,), "inputs": (INPUTS,), "
 MOST_NAMES = 5
 
 
-class Outcome(Protocol):
+class SourceOutcome(Protocol):
     """Outcome of a source: its value has `night` and `added`."""
 
     @property
@@ -48,7 +48,7 @@ def size_passages(
 
 
 def change_passages(
-    outcomes: Sequence[Outcome], removed: Sequence[str], replaced: Sequence[str], joined: Sequence[int]
+    outcomes: Sequence[SourceOutcome], removed: Sequence[str], replaced: Sequence[str], joined: Sequence[int]
 ) -> list[Passage]:
     """Nights added, present, failed, removed; years joined."""
     values = [outcome.value for outcome in outcomes if outcome.value is not None]

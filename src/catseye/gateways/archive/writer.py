@@ -14,10 +14,8 @@ from catseye.gateways.archive.tables import write_table
 from catseye.gateways.writers.objects import plain, versions
 from catseye.records.archive.index import ArchivedFile, ArchivedNight, entry_text, night_path
 from catseye.records.archive.layout import INPUTS, PROVENANCE, SAMPLES, TABLES, year_folder, year_of
-from catseye.records.archive.parquet import package_version
+from catseye.records.archive.parquet import PACKAGES, package_version
 from catseye.records.archive.provenance import InputFile, NightProvenance, provenance_text
-
-PACKAGES = ("pyarrow", "blosc2")
 
 
 def write_night(directory: Path, content: NightContent) -> ArchivedNight:

@@ -10,6 +10,7 @@ from catseye.errors import InputError
 from catseye.records.archive.layout import table_layout
 
 EXTRA = "pip install 'catseye[scale]'"
+PACKAGES = ("pyarrow", "blosc2")
 MAGIC = b"PAR1"
 TAIL = 8  # bytes: length of the footer, and the magic
 

@@ -57,7 +57,15 @@ class SampleFrame:
             raise refusal(str(path), f"format = {form!r} (expected {FRAME_FORMAT!r}; use a newer catseye)")
         if len(periods) != rows or len(checksums) != -(-rows // shots):
             raise damaged(path, "is no complete frame of samples")
-        return SampleFrame(path, (rows, width), shots, columns, periods, checksums, schunk)
+        return SampleFrame(
+            path=path,
+            shape=(rows, width),
+            shots=shots,
+            columns=columns,
+            periods=periods,
+            checksums=checksums,
+            schunk=schunk,
+        )
 
     def block(self, number: int) -> Samples:
         """Samples of a chunk's rows; InputError if they differ from their checksum."""

@@ -41,15 +41,18 @@ def change_archive(
 
     directory   of the archive; new or empty where there are sources
 
-    Raises InputError: an invalid source, before anything is written; another process that writes to the archive; a
-    night to be removed that is not there; a full disk.
+    Raises InputError: a missing package or an invalid source, before anything is written; another process that writes
+    to the archive; a night to be removed that is not there; a full disk.
     """
     from catseye.gateways.archive.files import create_archive, sole_writer
     from catseye.gateways.archive.joining import drop_nights, join_years, superseded
+    from catseye.records.archive.parquet import PACKAGES, scale_module
     from catseye.records.archive.reading import open_archive, refuse_foreign
     from catseye.service.archive.sources import archive_units
     from catseye.service.many.run import run_many
 
+    for package in PACKAGES:
+        scale_module(package)
     units = archive_units(directory, sources)
     if units:
         create_archive(directory)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from catseye.constants import MILLIMETRE
 from catseye.errors import ArgumentError
 from catseye.service.many.ledger import is_ledger
 from catseye.service.many.unit import Unit
@@ -32,11 +33,10 @@ def night_units(nights: Sequence[Path], directory: Path, *, air_model: str) -> l
         name = night.name
         if name in places:
             raise ArgumentError(
-                f"campaign {night}: has the name of {places[name]} (expected different names, or one night at a time)",
-                "campaign",
+                f"two nights are named {name}: {places[name]} and {night} (expected different names, or two calls)"
             )
         if name == LEDGER or name.startswith("."):
-            raise ArgumentError(f"campaign {night}: is named {name!r} (expected another name)", "campaign")
+            raise ArgumentError(f"{night}: {name!r} cannot name a night's folder (expected another name)")
         places[name], out = night, directory / name
         if directory.is_dir():
             refuse_output(out, night)
@@ -100,7 +100,7 @@ def reduce_night(night: str, directory: str, air_model: str) -> dict[str, Any]:
         "rejected": len(reduction.rejected),
         "variance_factor": float(coordinates.variance_factor),
         "degrees_of_freedom": float(coordinates.degrees_of_freedom),
-        "largest_u_mm": float(1e3 * coordinates.u.max()),
+        "median_u_mm": float(np.median(coordinates.u) / MILLIMETRE),
         "digest": digest(reduction),
         "out": str(out),
     }

@@ -1,9 +1,8 @@
 """Worker processes of this machine, each in a pool of its own, so that a death has one unit to blame."""
 
-import signal
 import time
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from multiprocessing import connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 from catseye.service.many.unit import Death, Unit, UnitReport
 from catseye.service.many.work import perform
-from catseye.service.many.worker import begin, starting
+from catseye.service.many.worker import begin, start_tracker, starting
 
 LEAVE = 2.5  # s that a worker has to leave by itself, before it is killed
 KILLED = 1.0  # s until a killed process is gone
@@ -43,20 +42,21 @@ class _Slot:
 
     def submit(self, unit: Unit, ledger: Path | None) -> "Future[UnitReport]":
         """Report to come; a process that died while idle is replaced first."""
-        with starting(with_main=self._with_main):
-            try:
+        try:
+            with nullcontext() if self._context.started else starting(with_main=self._with_main):
                 return self._pool.submit(perform, unit, ledger)
-            except BrokenExecutor:
-                self.renew()
+        except BrokenExecutor:
+            self.renew()
+            with starting(with_main=self._with_main):
                 return self._pool.submit(perform, unit, ledger)
 
-    def renew(self) -> str:
+    def renew(self) -> Death:
         """Replace the process that died; how it died."""
         self._pool.shutdown(wait=True)
         codes = [process.exitcode for process in self._context.started]
         self._make()
         code = next((code for code in codes if code), 1)
-        return f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with status {code}"
+        return Death(code)
 
     def shut(self) -> None:
         """Let the idle process end."""
@@ -68,7 +68,7 @@ class _Slot:
 
     @property
     def alive(self) -> list[SpawnProcess]:
-        """ProcessWorkers that were started and have not been seen to end."""
+        """Processes that were started and have not been seen to end."""
         return list(self._context.started)
 
 
@@ -81,6 +81,7 @@ class ProcessWorkers:
 
     def __init__(self, count: int, ledger: Path | None, *, with_main: bool):
         self.count, self._ledger = count, ledger
+        start_tracker()
         context = SpawnContext()
         theirs, self._lifeline = context.Pipe(duplex=False)
         self._slots = [_Slot(theirs, with_main=with_main) for _ in range(count)]
@@ -101,7 +102,10 @@ class ProcessWorkers:
             try:
                 answers.append((number, future.result()))
             except BrokenExecutor:
-                answers.append((number, Death(slot.renew())))
+                answers.append((number, slot.renew()))
+            except Exception as problem:  # noqa: BLE001 - an argument or an answer that cannot be pickled
+                text = " ".join(f"{type(problem).__name__}: {problem}".split())
+                answers.append((number, UnitReport("failed", text, None, 0.0)))
             self._idle.append(slot)
         return answers
 

@@ -12,7 +12,7 @@ from catseye.interruption import undo_on_interruption
 from catseye.memory import available
 from catseye.processors import free_cores
 from catseye.service.many.ledger import clear_unfinished, opened, read_entry
-from catseye.service.many.unit import Death, Unit, UnitOutcome, UnitReport
+from catseye.service.many.unit import Death, LostClusterError, Unit, UnitOutcome, UnitReport
 
 DEATHS = 3  # of a process with this unit alone, until the unit is to blame
 RESERVE = 0.8  # share of the available memory that units may take together
@@ -32,7 +32,7 @@ class StoppedError(CatseyeError):
 
 
 class Workers(Protocol):
-    """ProcessWorkers that do units, here or on a cluster."""
+    """Processes that do units, here or on a cluster."""
 
     count: int
 
@@ -107,7 +107,7 @@ def _refuse(units: Sequence[Unit], processes: int | None) -> None:
 
 
 def _count(units: Sequence[Unit], processes: int | None, memory: int) -> int:
-    """ProcessWorkers that are useful: no more than units, and by default than free cores and memory allow."""
+    """Processes that are useful: no more than units, and by default than free cores and memory allow."""
     count = processes
     if count is None:
         largest = max(unit.memory for unit in units)
@@ -124,7 +124,9 @@ def _workers(run: "_Run", count: int, cluster: str | None) -> Iterator[Workers]:
 
         workers: Workers = ProcessWorkers(count, run.ledger, with_main=with_main)
     else:
-        raise ArgumentError(f"cluster = {cluster!r}: there is none", "cluster")
+        from catseye.service.many.cluster import ClusterWorkers
+
+        workers = ClusterWorkers(cluster, count, run.ledger, with_main=with_main)
 
     def undo() -> None:
         workers.kill()
@@ -136,10 +138,13 @@ def _workers(run: "_Run", count: int, cluster: str | None) -> Iterator[Workers]:
         except BaseException as problem:
             workers.abandon()
             run.clear()
+            if isinstance(problem, LostClusterError):
+                raise run.stop(str(problem)) from problem
             if isinstance(problem, KeyboardInterrupt):
                 problem.add_note(run.remaining())
             raise
         workers.close()
+        run.clear()
 
 
 class _Run:
@@ -212,8 +217,7 @@ class _Run:
             if self._deaths[number] < DEATHS:
                 self._alone.append(number)
                 return
-            why = f"its process was {answer.why} {DEATHS + 1} times, most likely out of memory"
-            self._outcomes[number] = UnitOutcome(unit.name, "failed", why, None, 0.0)
+            self._outcomes[number] = UnitOutcome(unit.name, "failed", answer.text(DEATHS + 1), None, 0.0)
         elif answer.state == "stopped":
             raise self.stop(f"{unit.name}: {answer.why}")
         else:

@@ -8,6 +8,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from types import ModuleType
 
@@ -15,34 +16,58 @@ from catseye.interruption import exit_on_signals, leave
 from catseye.memory import keep_heap_small
 from catseye.processors import VARIABLES
 
-ONE_THREAD = (*VARIABLES, "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+ONE_THREAD = (*VARIABLES, "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 GRACE = 1.5  # s for the main thread to undo its output, which may be inside a long call of a library
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def start_tracker() -> None:
+    """Start multiprocessing's tracker, which removes the semaphores of a run that was stopped, without a warning."""
+    before = os.environ.get("PYTHONWARNINGS")
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (before, "ignore:resource_tracker:UserWarning")))
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        if before is None:
+            del os.environ["PYTHONWARNINGS"]
+        else:
+            os.environ["PYTHONWARNINGS"] = before
 
 
 @contextmanager
 def starting(*, with_main: bool) -> Iterator[None]:
     """Start processes in the block: one thread each, signals held back until they know what to do.
 
-    with_main   they import the main module, as functions from it need; without, a script needs no `if __name__ ==
-                "__main__"`
+    with_main   as for `hidden_main`
     """
     before = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
-    main = sys.modules["__main__"]
-    if not with_main:
-        sys.modules["__main__"] = ModuleType("__main__")
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
     try:
-        yield
+        with hidden_main(with_main=with_main):
+            yield
     finally:
-        sys.modules["__main__"] = main
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextmanager
+def hidden_main(*, with_main: bool) -> Iterator[None]:
+    """Hide the main module from processes that start, so that a script needs no `if __name__ == "__main__"`.
+
+    with_main   True: they import it, as functions from it need
+    """
+    main = sys.modules["__main__"]
+    if not with_main:
+        sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 def begin(lifeline: Connection) -> None:
