@@ -216,6 +216,7 @@ def _zeros(k, rng, truth, common, years):
         first, step = truth.zero_steps.get(ranger, (0, 0.0))
         value[row] += step * (k >= first)
     columns = {"ranger": RANGERS, "parameter": "zero", "value": value, "u": U_ZERO, "prior": 0.0, "u_prior": 1e-3}
+    columns["u_adjusted"] = U_ZERO
     return _broadcast({**columns, **common}, len(RANGERS))
 
 

@@ -17,6 +17,7 @@ from repository import TESTS
 
 FROZEN = TESTS / "vectors" / "formats" / "archive-1"
 TRUTH = YearTruth(start=61041.0 + 363.15)
+LATER = {("zeros", "u_adjusted")}  # columns that it did not have
 CONTENT = "2768bd329d4d398f205725c744051f811c661b846810b6f6346a62f5bbc44e58"  # when it was written
 
 
@@ -36,6 +37,8 @@ def content(archive):
     digest = hashlib.sha256()
     for kind in TABLES:
         for name, column in read_table(archive, kind).items():
+            if (kind, name) in LATER:
+                continue
             cells = repr(column.tolist()) if column.dtype.kind == "U" else column.astype("<f8").tobytes().hex()
             digest.update(f"{kind} {name} {cells}\n".encode())
     digest.update(read_samples(archive, archive.nights[-1]).astype("<i2").tobytes())

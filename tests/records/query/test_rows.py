@@ -1,12 +1,16 @@
 """A few rows by DuckDB are those of `read_table`, and a damaged file is named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from archive_scene import flip, written_year
+from archive_scene import U_ZERO, YearTruth, flip, written_year, year_contents
 from catseye.errors import InputError
+from catseye.gateways.archive.files import create_archive, sole_writer
+from catseye.gateways.archive.writer import write_night
 from catseye.records.archive.layout import TABLES
-from catseye.records.archive.reading import read_table
+from catseye.records.archive.reading import open_archive, read_table
 from catseye.records.query.rows import select_rows
 
 
@@ -47,6 +51,24 @@ def test_a_span_and_a_night(year):
 def test_an_unknown_column_is_refused(year):
     with pytest.raises(InputError, match="'y2' is unknown"):
         select_rows(year, "points", ("y2",), {})
+
+
+def test_files_without_a_column_of_today_are_read(tmp_path, monkeypatch):
+    """As an earlier catseye wrote them: the first of two nights, both, none."""
+    fields = TABLES["zeros"].fields
+    earlier = replace(TABLES["zeros"], fields=tuple(field for field in fields if field.name != "u_adjusted"))
+    today = TABLES["zeros"]
+    for name, layouts in {"mixed": (earlier, today), "old": (earlier, earlier), "turned": (today, earlier)}.items():
+        create_archive(tmp_path / name)
+        with sole_writer(tmp_path / name):
+            for content, layout in zip(year_contents(2, 5, 1, YearTruth()), layouts, strict=True):
+                zeros = {column: values for column, values in content.tables["zeros"].items() if column in layout.names}
+                with monkeypatch.context() as patched:
+                    patched.setitem(TABLES, "zeros", layout)
+                    write_night(tmp_path / name, replace(content, tables={**content.tables, "zeros": zeros}))
+        found = select_rows(open_archive(tmp_path / name), "zeros", ("u", "u_adjusted"), {"ranger": "ZY104"})
+        assert np.isfinite(found["u_adjusted"]).tolist() == [layout is today for layout in layouts]
+        assert found["u"].tolist() == [U_ZERO, U_ZERO]
 
 
 @pytest.mark.parametrize("where", [40, -20, 3000])

@@ -40,7 +40,10 @@ def span_of(mjd: np.ndarray) -> str:
 
 def _range(values: np.ndarray, unit: str, form: str) -> str:
     finite = values[np.isfinite(values)]
-    return f"{finite.min():{form}} to {finite.max():{form}} {unit}" if len(finite) else "unknown"
+    if not len(finite):
+        return "unknown"
+    low, high = format(finite.min(), form), format(finite.max(), form)
+    return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
 
 
 def _three(values: np.ndarray, form: str) -> str:
@@ -106,14 +109,16 @@ def ranger_passages(series: "RangerSeries") -> list[Passage]:
 
 def pose_passages(series: "PoseSeries") -> list[Passage]:
     """Extent of the motion, and circumstances."""
-    t, r = np.ptp(series.translation, axis=0) / MILLIMETRE, np.ptp(series.rotation, axis=0) / ARCSECOND
+    single = len(series.night) == 1
+    extent = series.motion[0] if single else np.ptp(series.motion, axis=0)
     u = np.median(series.u, axis=0)
     passages = [
         Passage(
             "The pose",
-            f"{series.body} moved over {_three(t, '.3f')} mm along x, y, z (u of a night "
-            f"{_three(u[:3] / MILLIMETRE, '.3f')}) and turned over {_three(r, '.2f')} arcsec "
-            f"(u {_three(u[3:] / ARCSECOND, '.2f')}).",
+            f"{series.body}, {'off nominal by' if single else 'moved over'} "
+            f"{_three(extent[:3] / MILLIMETRE, '.3f')} mm along x, y, z "
+            f"(u of a night {_three(u[:3] / MILLIMETRE, '.3f')}), turned {'by' if single else 'over'} "
+            f"{_three(extent[3:] / ARCSECOND, '.2f')} arcsec (u {_three(u[3:] / ARCSECOND, '.2f')}).",
         ),
         _circumstances(series.mjd, series.elevation, series.temperature_c),
     ]

@@ -7,8 +7,7 @@ import numpy as np
 
 from catseye.records.archive.layout import TableLayout, table_layout
 from catseye.records.archive.parquet import scale_module
-from catseye.records.archive.reading import ArchiveFolder, refuse_damaged
-from catseye.records.files.refusal import refusal
+from catseye.records.archive.reading import ArchiveFolder, read_table, refuse_damaged
 
 
 def select_rows(
@@ -47,18 +46,14 @@ def select_rows(
     names = ", ".join(f'"{name}"' for name in columns)
     source, order = "read_parquet(?, hive_partitioning = false)", f'"{layout.names[0]}", mjd'
     text = f"SELECT {names} FROM {source}{condition} ORDER BY {order}"
-    found = _fetched(archive, text, [[str(archive.directory / file.path) for file in files], *tests.values()])
-    return {name: _plain(layout, name, found[name]) for name in columns}
-
-
-def _fetched(archive: ArchiveFolder, text: str, values: list[Any]) -> dict[str, Any]:
+    values = [[str(archive.directory / file.path) for file in files], *tests.values()]
     duckdb = scale_module("duckdb")
     with duckdb.connect(config={"autoload_known_extensions": False, "autoinstall_known_extensions": False}) as session:
         try:
-            answer: dict[str, Any] = session.execute(text, values).fetchnumpy()
-        except duckdb.Error as problem:
-            raise refusal(str(archive.directory), f"cannot be queried: {first_line(problem)}") from problem
-    return answer
+            found = session.execute(text, values).fetchnumpy()
+        except duckdb.Error:  # an earlier catseye wrote files without a column, or none can be read: pyarrow says which
+            return read_table(archive, kind, columns, where=where, since=since, until=until)
+    return {name: _plain(layout, name, found[name]) for name in columns}
 
 
 def first_line(problem: Exception) -> str:

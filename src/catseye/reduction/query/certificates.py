@@ -91,7 +91,10 @@ def _judged(instruments: list[str], validity: tuple[CertificateState, ...]) -> V
         if each in (CertificateState.EXPIRED, CertificateState.LATER)
     ]
     if not bad:
-        return Verdict("good", f"{several(len(instruments), 'certificate')}, all of them valid on the night")
+        count = several(len(instruments), "certificate")
+        if endless := validity.count(CertificateState.UNLIMITED):
+            return Verdict("good", f"{count}, none of them expired; {endless} without an end of validity")
+        return Verdict("good", f"{count}, all of them valid on the night")
     name, each = bad[0]
     return Verdict(
         "doubtful",
