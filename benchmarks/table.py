@@ -4,6 +4,7 @@ import importlib.metadata
 import math
 import os
 import platform
+import textwrap
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -67,7 +68,7 @@ def page(
     """
     parts = [
         HEAD.format(when=f" on {date}" if date else ""),
-        machine(limits, load) + f" The run took {took / 60.0:.1f} minutes.\n",
+        textwrap.fill(machine(limits, load) + f" The run took {took / 60.0:.1f} minutes.", 118) + "\n",
         "## Hot paths\n",
         "| hot path | work | ours | beside it | of the limit | spread |",
         "|---|---|---|---|---|---|",
