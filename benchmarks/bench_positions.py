@@ -70,11 +70,11 @@ def ceres(stations: np.ndarray, starts: np.ndarray, d: np.ndarray) -> np.ndarray
             return True
 
     answer = [start.copy() for start in starts]
-    kept = [Ranges(row) for row in d]
+    costs = [Ranges(row) for row in d]
     options = pyceres.SolverOptions()
     options.num_threads = 1
     options.linear_solver_type = pyceres.LinearSolverType.DENSE_QR
-    for x, cost in zip(answer, kept, strict=True):
+    for x, cost in zip(answer, costs, strict=True):
         problem = pyceres.Problem()
         problem.add_residual_block(cost, None, [x])
         pyceres.solve(options, problem, pyceres.SolverSummary())

@@ -75,6 +75,11 @@ class Curve:
     values: tuple[float, ...]
     unit: str = "s"
 
+    def last_exponent(self) -> float:
+        """Slope between the two largest sizes."""
+        (a, b), (u, v) = np.log(self.sizes[-2:]), np.log(self.values[-2:])
+        return round(float((v - u) / (b - a)), 3) + 0.0
+
     def text(self, value: float) -> str:
         """Value with its unit."""
         return duration(value) if self.unit == "s" else f"{value:.3g} {self.unit}"

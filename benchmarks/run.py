@@ -62,8 +62,8 @@ def run(script: Path, *, quick: bool, longest: float = LONGEST_S) -> Findings:
         except subprocess.TimeoutExpired:
             why = f"still running after {longest:.0f} s"
         else:
-            told = (done.stderr or done.stdout).strip().splitlines()
-            why = f"status {done.returncode}: {told[-1] if told else 'no output'}" if done.returncode else ""
+            output = (done.stderr or done.stdout).strip().splitlines()
+            why = f"status {done.returncode}: {output[-1] if output else 'no output'}" if done.returncode else ""
         rows, curves = read_lines(lines)
     return Findings(
         script=script.name,

@@ -1,8 +1,10 @@
 """Table of all rows as text and as docs/benchmarks.md, and the figure of the scaling curves."""
 
 import importlib.metadata
+import math
 import os
 import platform
+import textwrap
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -66,7 +68,7 @@ def page(
     """
     parts = [
         HEAD.format(when=f" on {date}" if date else ""),
-        machine(limits, load) + f" The run took {took / 60.0:.1f} minutes.\n",
+        textwrap.fill(machine(limits, load) + f" The run took {took / 60.0:.1f} minutes.", 118) + "\n",
         "## Hot paths\n",
         "| hot path | work | ours | beside it | of the limit | spread |",
         "|---|---|---|---|---|---|",
@@ -125,14 +127,16 @@ def scaling(curves: Sequence[Curve]) -> list[str]:
     """Section of the scaling curves."""
     lines = [
         "## Scaling\n",
-        "Slope of the logarithms, with its standard uncertainty from the residuals.\n",
-        "| hot path | grows with | exponent | from | to |",
-        "|---|---|---|---|---|",
+        "Exponent of the best power through all sizes, with its standard uncertainty from the residuals, and between",
+        "the two largest sizes, where what does not grow no longer counts.\n",
+        "| hot path | grows with | exponent | at the end | from | to |",
+        "|---|---|---|---|---|---|",
     ]
     for curve in curves:
         slope, u = curve.exponent()
         ends = (f"{curve.sizes[i]:g}: {curve.text(curve.values[i])}" for i in (0, -1))
-        lines.append(f"| {curve.path}, {curve.what} | {curve.variable} | {slope:.2f} ± {u:.2f} | {' | '.join(ends)} |")
+        powers = f"{slope:.2f} ± {u:.2f} | {curve.last_exponent():.2f}"
+        lines.append(f"| {curve.path}, {curve.what} | {curve.variable} | {powers} | {' | '.join(ends)} |")
     return [*lines, "", "![Time or memory against size, logarithmic](pictures/scaling.svg)\n"]
 
 
@@ -142,17 +146,23 @@ def draw(curves: Sequence[Curve], path: Path) -> None:
 
     matplotlib.use("svg")
     from matplotlib import pyplot
+    from matplotlib.ticker import NullFormatter
 
     units = list(dict.fromkeys(curve.unit for curve in curves))
     with matplotlib.rc_context({"svg.hashsalt": "catseye", "font.size": 9}):
-        drawing, axes = pyplot.subplots(1, len(units), figsize=(4.6 * len(units) + 1.0, 4.4), squeeze=False)
+        drawing, axes = pyplot.subplots(
+            1, len(units), figsize=(5.0 * len(units), 4.4), squeeze=False, gridspec_kw={"wspace": 0.3}
+        )
         for unit, ax in zip(units, axes[0], strict=True):
             for curve in (each for each in curves if each.unit == unit):
-                slope = curve.exponent()[0]
-                label = f"{curve.path}, {curve.what} (~ n^{slope:.2f})"
+                label = f"{curve.path}, {curve.what}: exponent {curve.last_exponent():.2f} at the end"
                 ax.loglog(curve.sizes, curve.values, "o-", markersize=3.5, linewidth=1.2, label=label)
             ax.set_xlabel(" or ".join(dict.fromkeys(each.variable for each in curves if each.unit == unit)))
             ax.set_ylabel({"s": "time, s"}.get(unit, f"memory, {unit}"))
+            values = [value for curve in curves if curve.unit == unit for value in curve.values]
+            ax.set_ylim(10.0 ** math.floor(math.log10(min(values))), 10.0 ** math.ceil(math.log10(max(values))))
+            ax.yaxis.set_major_formatter("{x:g}")
+            ax.yaxis.set_minor_formatter(NullFormatter())
             ax.grid(True, which="major", linewidth=0.4)
             ax.legend(fontsize=6.5, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
         drawing.savefig(

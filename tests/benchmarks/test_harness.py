@@ -101,6 +101,14 @@ def test_the_exponent_is_the_slope_of_the_logarithms(power):
     assert abs(off - power) < 3.0 * u
 
 
+def test_the_last_exponent_is_that_of_the_two_largest_sizes():
+    """A constant part hides the growth of small sizes."""
+    sizes = (1.0, 10.0, 1e4, 1e5)
+    curve = Curve("a", "b", "n", sizes, tuple(1.0 + 1e-2 * n**2 for n in sizes))
+    assert curve.last_exponent() == pytest.approx(2.0, abs=1e-3)
+    assert curve.exponent()[0] < 1.9
+
+
 def test_lines_of_a_script_come_back(tmp_path, monkeypatch, capsys):
     curve = Curve("sum", "GB", "n", (1.0, 2.0), (0.5, 1.0), "GB")
     monkeypatch.setattr("sys.argv", ["bench_sum.py", "--quick", "--curves", "--lines", str(tmp_path / "lines")])

@@ -142,8 +142,8 @@ def test_the_page_lists_ratios_notes_what_is_missing_and_exponents():
     assert "| sum | a / b | 2 ms | numpy **5.0 x**; scipy **0.5 x** | 0.5 | 5 % |" in text
     assert "- sum, a | b: agree to 1e-9." in text
     assert "- gtsam: not installed (sum)." in text
-    assert "| sum, time | n | 2.00 ± 0.00 | 1: 1 s | 10: 100 s |" in text
-    assert "| sum, size | n | 0.00 ± 0.00 | 1: 2 GB | 10: 2 GB |" in text
+    assert "| sum, time | n | 2.00 ± 0.00 | 2.00 | 1: 1 s | 10: 100 s |" in text
+    assert "| sum, size | n | 0.00 ± 0.00 | 0.00 | 1: 2 GB | 10: 2 GB |" in text
     assert "The run took 2.0 minutes" in text
     assert sys.executable not in text
 
