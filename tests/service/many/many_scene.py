@@ -65,6 +65,11 @@ def killed_once(number, folder):
     return {"number": number}
 
 
+def unsendable():
+    """An answer that no process can send."""
+    return {"function": lambda: None}
+
+
 def full(number):
     """A unit that finds the disk full."""
     try:

@@ -53,7 +53,7 @@ def test_a_local_cluster_gives_what_processes_give():
 def test_a_unit_that_kills_its_workers_fails_and_the_others_do_not():
     found = run_many([*units(killed, 1), *units(square, 2)], processes=2, cluster="local")
     assert [outcome.state for outcome in found] == ["failed", "done", "done"]
-    assert found[0].why == "its process was killed with its worker 4 times, most likely out of memory"
+    assert found[0].why == "its worker was killed 4 times, most likely out of memory"
 
 
 def test_a_worker_of_another_version_stops_the_run(tmp_path):

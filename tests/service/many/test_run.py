@@ -1,6 +1,10 @@
 """Many units: each has its outcome, in order, whatever becomes of the processes."""
 
 import json
+import multiprocessing
+import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -9,6 +13,8 @@ from catseye.errors import ArgumentError, InputError
 from catseye.service.many.ledger import opened
 from catseye.service.many.run import StoppedError, run_many
 from catseye.service.many.unit import Unit
+from process_scene import ends_with_us
+from repository import ROOT
 from service.many.many_scene import (
     backwards,
     broken,
@@ -21,6 +27,7 @@ from service.many.many_scene import (
     span,
     square,
     units,
+    unsendable,
 )
 
 
@@ -39,8 +46,6 @@ def test_each_process_has_one_thread_of_linear_algebra_and_the_caller_its_own(mo
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     (found,) = run_many(units(square, 1), processes=1)
     assert found.value == {"square": 0, "third": 0.0, "threads": "1"}
-    import os
-
     assert os.environ["OPENBLAS_NUM_THREADS"] == "2"
 
 
@@ -67,6 +72,13 @@ def test_a_unit_that_always_kills_its_process_fails_and_the_others_do_not():
     found = run_many([*units(killed, 1), *units(square, 3)], processes=2)
     assert states(found) == ["failed", "done", "done", "done"]
     assert found[0].why == "its process was killed by SIGKILL 4 times, most likely out of memory"
+
+
+def test_what_cannot_be_sent_to_a_process_fails_by_itself():
+    found = run_many([Unit("local", lambda: {"x": 1}), Unit("answer", unsendable), *units(square, 1)], processes=1)
+    assert states(found) == ["failed", "failed", "done"]
+    assert "pickle" in found[0].why
+    assert "pickle" in found[1].why
 
 
 def test_units_share_the_memory_and_too_large_a_one_runs_by_itself():
@@ -166,3 +178,44 @@ def test_the_ledger_holds_one_whole_file_a_unit(tmp_path):
     names = sorted(path.name for path in (tmp_path / "ledger").iterdir())
     assert names == ["ledger.json", "square-0.json", "square-1.json"]
     assert json.loads((tmp_path / "ledger" / "square-1.json").read_text())["entry"]["value"]["square"] == 1
+
+
+def test_an_interrupted_call_ends_its_processes_and_notes_what_is_done(tmp_path):
+    def interrupt(task, done, total):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as told:
+        run_many(units(square, 4), processes=1, ledger=tmp_path / "ledger", progress=interrupt)
+    assert told.value.__notes__ == ["2 of 4 are done; resume continues from there"]
+    for child in multiprocessing.active_children():
+        child.join(1.0)  # its files are closed a moment before it is gone
+        assert not child.is_alive()
+    states_then = states(run_many(units(square, 4), processes=1, ledger=tmp_path / "ledger", resume=True))
+    assert states_then == ["resumed", "resumed", "done", "done"]
+
+
+SCRIPT = """
+from catseye.service.many.run import run_many
+from service.many.many_scene import square, units
+print([each.value["square"] for each in run_many(units(square, 3), processes=2)])
+"""
+OWN = """
+from catseye.service.many.run import run_many
+from catseye.service.many.unit import Unit
+def own(number):
+    return {"cube": number**3}
+if __name__ == "__main__":
+    print([each.value["cube"] for each in run_many([Unit(str(k), own, (k,)) for k in range(3)], processes=2)])
+"""
+
+
+@pytest.mark.parametrize(("text", "said"), [(SCRIPT, "[0, 1, 4]"), (OWN, "[0, 1, 8]")])
+def test_a_script_needs_no_guard_unless_it_defines_the_work(tmp_path, text, said):
+    script = tmp_path / "script.py"
+    script.write_text(text)
+    place = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}:{ROOT / 'tests'}"}
+    done = subprocess.run(
+        [sys.executable, script], check=False, capture_output=True, text=True, env=place, preexec_fn=ends_with_us()
+    )
+    assert (done.stdout.strip(), done.stderr, done.returncode) == (said, "", 0)

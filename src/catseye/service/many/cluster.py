@@ -15,12 +15,13 @@ import threading
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from catseye.errors import ArgumentError, InputError
+from catseye.interruption import Unfinished, undo_on_interruption
 from catseye.memory import keep_heap_small
 from catseye.processors import VARIABLES
 from catseye.service.many.unit import Death, LostClusterError, Unit, UnitReport
@@ -82,18 +83,20 @@ class ClusterWorkers:
         self._ledger, self._answers = ledger, queue.SimpleQueue[Any]()
         self._running: dict[Any, int] = {}
         self._cluster: Any = None
-        self._scratch, self._own = "", _own_settings(dask, with_main=with_main)
-        self._own.__enter__()
+        self._scratch, self._own = "", ExitStack()
+        self._own.enter_context(_own_settings(dask, with_main=with_main))
         try:
             if address == LOCAL:
                 start_tracker()
                 self._scratch = tempfile.mkdtemp(prefix="catseye-dask-")
+                self._own.enter_context(undo_on_interruption(Unfinished(self._scratch)))
                 self._cluster = dask.LocalCluster(
                     n_workers=count,
                     threads_per_worker=1,
                     processes=True,
                     dashboard_address=None,
                     worker_dashboard_address=None,
+                    scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else its pages take port 8787
                     silence_logs=logging.CRITICAL,
                     memory_limit=0,
                     local_directory=self._scratch,
@@ -101,9 +104,11 @@ class ClusterWorkers:
                 )
             self._client = self._connected(dask, address)
             self._client.wait_for_workers(1, timeout=START)
-        except (OSError, TimeoutError) as problem:
+        except (OSError, TimeoutError, RuntimeError) as problem:
             self._end()
-            raise InputError(f"cluster {address}: no worker answers ({problem or 'in time'})") from problem
+            raise InputError(
+                f"cluster {address}: no worker answers ({' '.join(str(problem).split()) or 'in time'})"
+            ) from problem
         except BaseException:
             self._end()
             raise
@@ -156,7 +161,7 @@ class ClusterWorkers:
         if future.status == "error":
             problem = future.exception(timeout=CONNECT)
             if type(problem).__name__ == "KilledWorker":
-                return Death("killed with its worker")
+                return Death()
             text = " ".join(f"{type(problem).__name__}: {problem}".split())
             if isinstance(problem, ImportError):
                 return UnitReport("stopped", f"a worker has not the same catseye: {text}", None, 0.0)
@@ -228,7 +233,7 @@ class ClusterWorkers:
                 cluster.close(timeout=GONE)
         if self._scratch:
             shutil.rmtree(self._scratch, ignore_errors=True)
-        self._own.__exit__(None, None, None)
+        self._own.close()
 
 
 @contextmanager

@@ -1,9 +1,8 @@
 """Worker processes of this machine, each in a pool of its own, so that a death has one unit to blame."""
 
-import signal
 import time
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from multiprocessing import connection
 from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
@@ -43,20 +42,21 @@ class _Slot:
 
     def submit(self, unit: Unit, ledger: Path | None) -> "Future[UnitReport]":
         """Report to come; a process that died while idle is replaced first."""
-        with starting(with_main=self._with_main):
-            try:
+        try:
+            with nullcontext() if self._context.started else starting(with_main=self._with_main):
                 return self._pool.submit(perform, unit, ledger)
-            except BrokenExecutor:
-                self.renew()
+        except BrokenExecutor:
+            self.renew()
+            with starting(with_main=self._with_main):
                 return self._pool.submit(perform, unit, ledger)
 
-    def renew(self) -> str:
+    def renew(self) -> Death:
         """Replace the process that died; how it died."""
         self._pool.shutdown(wait=True)
         codes = [process.exitcode for process in self._context.started]
         self._make()
         code = next((code for code in codes if code), 1)
-        return f"killed by {signal.Signals(-code).name}" if code < 0 else f"ended with status {code}"
+        return Death(code)
 
     def shut(self) -> None:
         """Let the idle process end."""
@@ -102,7 +102,10 @@ class ProcessWorkers:
             try:
                 answers.append((number, future.result()))
             except BrokenExecutor:
-                answers.append((number, Death(slot.renew())))
+                answers.append((number, slot.renew()))
+            except Exception as problem:  # noqa: BLE001 - an argument or an answer that cannot be pickled
+                text = " ".join(f"{type(problem).__name__}: {problem}".split())
+                answers.append((number, UnitReport("failed", text, None, 0.0)))
             self._idle.append(slot)
         return answers
 

@@ -217,8 +217,7 @@ class _Run:
             if self._deaths[number] < DEATHS:
                 self._alone.append(number)
                 return
-            why = f"its process was {answer.why} {DEATHS + 1} times, most likely out of memory"
-            self._outcomes[number] = UnitOutcome(unit.name, "failed", why, None, 0.0)
+            self._outcomes[number] = UnitOutcome(unit.name, "failed", answer.text(DEATHS + 1), None, 0.0)
         elif answer.state == "stopped":
             raise self.stop(f"{unit.name}: {answer.why}")
         else:

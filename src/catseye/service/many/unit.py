@@ -1,5 +1,6 @@
 """Unit of work, its report from the process that did it, and its outcome."""
 
+import signal
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,6 +8,10 @@ from typing import Any, Literal, NamedTuple
 
 from catseye.errors import InputError
 
+LIKELY = {  # cause of a process's end by a signal
+    signal.SIGKILL: ", most likely out of memory",
+    signal.SIGBUS: ": an input file was cut short, or the disk is full",
+}
 MEMORY = 300 * 2**20  # bytes that a unit may take, unless it says more
 
 
@@ -66,10 +71,23 @@ class UnitReport(NamedTuple):
 class Death(NamedTuple):
     """End of a process in the middle of a unit.
 
-    why   one line without a name: "killed by SIGKILL"
+    status   of its exit, negative a signal's number; None where a cluster does not say
     """
 
-    why: str
+    status: int | None = None
+
+    def text(self, times: int) -> str:
+        """One line on a process that ended so several times.
+
+        >>> Death(1).text(4)
+        'its process ended with status 1 4 times'
+        """
+        if self.status is not None and self.status >= 0:
+            return f"its process ended with status {self.status} {times} times"
+        if self.status is None:
+            return f"its worker was killed {times} times, most likely out of memory"
+        name = signal.Signals(-self.status).name
+        return f"its process was killed by {name} {times} times{LIKELY.get(signal.Signals(-self.status), '')}"
 
 
 class LostClusterError(InputError):
