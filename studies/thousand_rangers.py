@@ -29,7 +29,7 @@ from catseye.coordinator.journal.entries import AnsweredShot, Run
 from catseye.coordinator.journal.writer import Journal
 from catseye.coordinator.plan.round import RoundPlanner
 from catseye.coordinator.visibility.vantage import vantages_of
-from catseye.gateways.writers.drawing import BAD, SERIES, STYLE, Figure, mpl, svg
+from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.gateways.writers.output import atomic_directory
 from catseye.records.night.live import TICKS_PER_DAY, LiveShot
 from catseye.records.site.folder import SiteFolder, site_files
@@ -444,8 +444,7 @@ def draw(sites: Sequence[dict], units: Units, directory: Path) -> None:
         left.set_title("Work of one coordinator", loc="left")
         left.legend(fontsize="x-small", loc="lower right")
         lines = (
-            ("raw samples", units.rate * n * RAW),
-            ("samples, packed in the journal", units.rate * n * units.packed),
+            ("samples in the journal", units.rate * n * units.packed),
             ("covariances of one coordinator", units.covariance(n) / ROUND),
             ("all else", units.rate * n * units.row),
         )
@@ -455,9 +454,18 @@ def draw(sites: Sequence[dict], units: Units, directory: Path) -> None:
             measured,
             [1e-6 * m["journal"]["covariances"] / max(1, len(m["epochs"])) / ROUND for m in sites],
             "o",
-            color=SERIES[2],
+            color=SERIES[1],
             ms=4,
         )
+        for axes in (left, right):
+            axes.axvline(measured[-1], color=FAINT, lw=0.8)
+            axes.annotate(
+                " extrapolated",
+                (measured[-1], 0.02),
+                xycoords=("data", "axes fraction"),
+                color=FAINT,
+                fontsize="x-small",
+            )
         right.set(xscale="log", yscale="log", xlabel="rangers of one coordinator", ylabel="MB a second")
         right.set_title("Bytes of one coordinator", loc="left")
         right.legend(fontsize="x-small", loc="upper left")

@@ -77,11 +77,14 @@ def test_a_journal_that_cannot_be_read_does_not_stop_the_others(tmp_path):
     assert many.outcomes[1].value["same"] is True
 
 
-def test_two_journals_of_one_name_are_refused(tmp_path):
-    (tmp_path / "a").mkdir()
-    (tmp_path / "b").mkdir()
-    with pytest.raises(ArgumentError, match="its name 'n' is taken"):
-        catseye.replay_journals([tmp_path / "a" / "n.db", tmp_path / "b" / "n.db"])
+def test_journals_of_one_name_have_their_folders_and_the_same_twice_is_refused(tmp_path):
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "n.db").write_bytes(b"not a journal")
+    many = catseye.replay_journals([tmp_path / "a" / "n.db", tmp_path / "b" / "n.db"], processes=1)
+    assert [(o.name, o.state) for o in many.outcomes] == [("a-n", "failed"), ("b-n", "failed")]
+    with pytest.raises(ArgumentError, match="its name 'a-n' is taken"):
+        catseye.replay_journals([tmp_path / "a" / "n.db", tmp_path / "a" / "n.db"])
 
 
 def test_runs_that_cannot_be_are_refused_before_any_begins(tmp_path):

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -178,7 +179,7 @@ def replay_journals(
 ) -> ManyResult:
     """Many journals' runs again, side by side: the same to the last bit, or how far each point moves.
 
-    journals       files, or postgresql://USER@HOST/DATABASE; no two of one name
+    journals       files, or postgresql://USER@HOST/DATABASE; no two of one name and folder name
     directory      new, empty, or of an earlier call: DIRECTORY/NAME is what `save(replay(journal), ...)` writes,
                    DIRECTORY/ledger what is done; None: nothing is written
     run            number, or the beginning of its uuid, in each; the last of each without
@@ -203,8 +204,7 @@ def replay_journals(
     where = _directory(directory, resume, *files, *([] if other is None else [other]))
     key = _key("replay", json.dumps([run, None if other is None else str(other)]))
     units: dict[str, Unit] = {}
-    for place in places:
-        name = _journal_name(place)
+    for place, name in zip(places, _journal_names(places), strict=True):
         if name in units or name == LEDGER:
             raise ArgumentError(
                 f"journal {place}: its name {name!r} is taken (expected different names, or one at a time)", "journal"
@@ -346,13 +346,17 @@ def _memory_of_journal(place: str) -> int:
         return PROCESS + MOST_JOURNAL
 
 
-def _journal_name(place: str) -> str:
-    """Name of a journal: of its file without the ending, or of its database.
+def _journal_names(places: Sequence[str]) -> list[str]:
+    """Names of journals: of a file without the ending, or of a database; with its folder's where two have the same.
 
-    >>> _journal_name("nights/site-1.db"), _journal_name("postgresql://zy@host/site")
-    ('site-1', 'site')
+    >>> _journal_names(["nights/site-1.db", "postgresql://zy@host/site"])
+    ['site-1', 'site']
+    >>> _journal_names(["runs/seed-1/n.db", "runs/seed-2/n.db"])
+    ['seed-1-n', 'seed-2-n']
     """
-    return Path(place.partition("?")[0]).stem
+    paths = [Path(place.partition("?")[0]) for place in places]
+    counts = Counter(path.stem for path in paths)
+    return [path.stem if counts[path.stem] == 1 else f"{path.parent.name}-{path.stem}" for path in paths]
 
 
 def _key(*texts: str) -> str:

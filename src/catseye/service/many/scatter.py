@@ -74,13 +74,26 @@ def scatter_of(values: Sequence[Mapping[str, Any]]) -> tuple[ScatterRow, ...]:
     if solved:
         terms = sum(value["coordinates"] for value in solved)
         square = sum(value["coordinates"] * value["chi2_per_coordinate"] for value in solved)
-        rows.append(ScatterRow(POINTS, len(solved), terms, math.sqrt(square / terms), _band(terms), math.nan))
+        rows.append(
+            ScatterRow(
+                quantity=POINTS,
+                runs=len(solved),
+                terms=terms,
+                ratio=math.sqrt(square / terms),
+                band=_band(terms),
+                mean=math.nan,
+            )
+        )
     for name, text in BEAM.items():
         parts = [value["beam"][name] for value in values if name in value.get("beam", {})]
         if errors := [(part["found"] - part["true"]) / part["u"] for part in parts]:
             count = len(errors)
             ratio = math.sqrt(sum(error**2 for error in errors) / count)
-            rows.append(ScatterRow(text, count, count, ratio, _band(count), sum(errors) / count))
+            rows.append(
+                ScatterRow(
+                    quantity=text, runs=count, terms=count, ratio=ratio, band=_band(count), mean=sum(errors) / count
+                )
+            )
     return tuple(rows)
 
 
@@ -98,7 +111,7 @@ def scatter_verdict(rows: Sequence[ScatterRow], runs: Verdict) -> Verdict:
 
 
 def scatter_text(row: ScatterRow) -> str:
-    """A row in words."""
+    """Ratio, band and mean of a row, for people."""
     mean = "" if math.isnan(row.mean) else f", mean {row.mean:+.2f} u"
     low, high = row.band
     return f"{row.ratio:.3f} of the claimed u over {row.runs} runs (99 % band {low:.3f} to {high:.3f}){mean}."
