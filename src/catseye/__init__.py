@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from catseye.api.positions import locate
     from catseye.api.reading import examples, load
     from catseye.api.result import save, show
+    from catseye.api.scale.archive import archive, restore
+    from catseye.api.scale.many import reduce_nights
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
@@ -73,6 +75,8 @@ FACE = {  # file of catseye.api -> its exported names
     "positions": ("locate",),
     "reading": ("examples", "load"),
     "result": ("save", "show"),
+    "scale.archive": ("archive", "restore"),
+    "scale.many": ("reduce_nights",),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
@@ -91,6 +95,7 @@ __all__ = [
     "acoustic",
     "adjust",
     "air",
+    "archive",
     "backup_journal",
     "baseline",
     "beam",
@@ -121,9 +126,11 @@ __all__ = [
     "pose",
     "predict_pointing",
     "reduce",
+    "reduce_nights",
     "refractometer",
     "replay",
     "report_of",
+    "restore",
     "safety",
     "save",
     "save_triplet_form",

@@ -124,25 +124,26 @@ def deferred() -> Iterator[None]:
     finally:
         _deferrals -= 1
         if _pending and not _deferrals:
-            _leave(_pending)
+            leave(_pending)
 
 
 def _handle(number: int, frame: FrameType | None) -> None:
     global _pending
     if not _deferrals:
-        _leave(number)
+        leave(number)
     if not _pending:
         _pending = number
-        alarm = threading.Timer(LONGEST_DEFERRAL, _leave, (number,))
+        alarm = threading.Timer(LONGEST_DEFERRAL, leave, (number,))
         alarm.daemon = True
         alarm.start()
 
 
-def _leave(number: int) -> None:
+def leave(number: int) -> None:
+    """Undo unfinished output and exit as after this signal, from any thread."""
     for undo in reversed(_undo):
         with suppress(OSError):
             undo()
     with suppress(OSError, ValueError, AttributeError):
-        if sys.stderr.isatty():
+        if number == signal.SIGINT and sys.stderr.isatty():
             os.write(sys.stderr.fileno(), b"\n")
     os._exit(128 + number)

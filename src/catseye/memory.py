@@ -6,13 +6,31 @@ import math
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 GIB = 2.0**30
 MALLOPT = {-3: 2**18, -8: 2}  # M_MMAP_THRESHOLD, bytes; M_ARENA_MAX (mallopt(3))
 UNLOADED = ("failed to map segment", "cannot allocate memory", "Cannot allocate memory")  # messages of the loader
 UNFOUND = "load shared object file"  # llvmlite's, whose file is missing or did not fit
+UNKNOWN = 2**31  # bytes that are assumed to be available where the system does not say
 WORKSPACE = 200 * 2**20  # bytes: 32 MiB a library and thread of OpenBLAS, the libraries, their arguments
 ADVICE = "use a machine or a limit with more; fewer shots or points at once need less"
+
+
+def available() -> int:
+    """Memory that this process and its children may still take, bytes; a limit of its address space is each one's.
+
+    Source: proc(5), MemAvailable; cgroups(7), memory.max and memory.current.
+    """
+    sizes = [resource.getrlimit(resource.RLIMIT_AS)[0]]
+    with suppress(OSError, ValueError, StopIteration), open("/proc/meminfo", encoding="ascii") as lines:
+        sizes.append(1024 * int(next(line for line in lines if line.startswith("MemAvailable")).split()[1]))
+    with suppress(OSError, ValueError):
+        group = Path("/sys/fs/cgroup")
+        limit = int((group / "memory.max").read_text(encoding="ascii"))  # "max" means no limit
+        sizes.append(limit - int((group / "memory.current").read_text(encoding="ascii")))
+    known = [size for size in sizes if size != resource.RLIM_INFINITY]
+    return max(0, min(known, default=UNKNOWN))
 
 
 def give_back() -> None:

@@ -172,3 +172,8 @@ class Load:
 
 
 LOAD = Load()
+
+
+def free_cores() -> int:
+    """Number of cores for processes of one thread now, at least one."""
+    return max(1, math.floor(LOAD.free() + SPARE))

@@ -249,6 +249,7 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 VERBS = ("plot",)  # groups whose name is the verb
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
+OF_SEVERAL = {"reduce": "reduce_nights"}  # command that takes one input or several -> function for several
 OTHER_DEFAULTS = {
     "simulate": {"fast", "port_base"}
 }  # a person watches in real time; a call takes virtual time, any port
@@ -275,9 +276,11 @@ def python_name(words):
 
 
 def signatures(words):
-    """Parameters of a command, and of its function."""
-    function = getattr(catseye_package, python_name(words))
-    return inspect.signature(callbacks()[words]).parameters, inspect.signature(function).parameters
+    """Parameters of a command, and of its function; where another does several inputs, of both."""
+    names = [OF_SEVERAL[words]] if words in OF_SEVERAL else []
+    functions = [getattr(catseye_package, name) for name in (*names, python_name(words))]
+    parameters = {key: each for function in functions for key, each in inspect.signature(function).parameters.items()}
+    return inspect.signature(callbacks()[words]).parameters, parameters
 
 
 def test_a_command_of_a_group_has_its_verb_first_in_python():

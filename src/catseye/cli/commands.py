@@ -9,6 +9,8 @@ import typer
 from typer.core import TyperGroup
 
 from catseye.cli.inputs import prepare
+from catseye.cli.many_options import NOTHING_SAID, Several, progress_of_many, refuse_several, tell_many
+from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine, say, wrapped
 from catseye.cli.vocabularies import AIR_MODEL, AIR_MODELS, one_of
@@ -22,6 +24,7 @@ ROOMS = (
     *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
+    "scale.archive",
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples"),
@@ -32,6 +35,7 @@ SUBJECTS = {  # as `catseye --help` groups the commands
     "Air": ("air", "sound", "refractometer", "acoustic"),
     "Light": ("point", "link", "beam", "glass", "safety"),
     "A living site": ("simulate", "serve", "view", "zy", "ziy", "replay", "export", "journal"),
+    "Years of nights": ("archive", "restore"),
     "Figures": ("plot",),
 }
 
@@ -139,29 +143,47 @@ def catseye(
     """Laser metrology for large telescopes and structures: raw samples to coordinates, with uncertainty."""
 
 
-@app.command(epilog="\b\nExample: catseye reduce examples/night-01 --out night-01-report")
+@app.command(
+    epilog="\b\nExample: catseye reduce examples/night-01 --out night-01-report\n"
+    "Several nights go into a folder each, and --resume continues: catseye reduce night-* --out nights --resume"
+)
+@grouped
 def reduce(
     campaign: Annotated[
-        Path, typer.Argument(metavar="CAMPAIGN", help="Directory of a campaign, laid out as examples/night-01.")
+        list[Path],
+        typer.Argument(metavar="NIGHT ...", help="Directories of campaigns, laid out as examples/night-01."),
     ],
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
             metavar="DIR",
-            help="Directory to write: new, empty, or an earlier output of catseye. Needed unless --json.",
+            help="Directory to write: new, empty, or an earlier output of catseye; several nights get DIR/NAME each. "
+            "Needed unless --json.",
         ),
     ] = None,
     air_model: AirModel = AIR_MODEL,
     threads: Threads = None,
+    several: Several = NOTHING_SAID,
     json: Json = False,
     quiet: Quiet = False,
     strict: Strict = False,
 ) -> None:
-    """A campaign's samples to coordinates, pose, surface and report."""
-    if out is None and not json:
-        raise typer.BadParameter("is needed unless --json is given.", param_hint="'--out'")
-    night = _reduced(campaign, out, air_model, quiet)
+    """A campaign's samples to coordinates, pose, surface and report; of several nights side by side."""
+    if out is None and (len(campaign) > 1 or not json):
+        needed = "is needed for several nights." if len(campaign) > 1 else "is needed unless --json is given."
+        raise typer.BadParameter(needed, param_hint="'--out'")
+    if out is not None and len(campaign) > 1:
+        if threads is not None:
+            raise typer.BadParameter("is for one night; several have one thread each.", param_hint="'--threads'")
+        from catseye.api.scale.many import reduce_nights
+
+        with progress_of_many("night", quiet=quiet, resumable=True) as progress:
+            nights = reduce_nights(campaign, out, air_model=air_model, **several._asdict(), progress=progress)
+        tell_many(nights, f"{out}/NAME/ for each night", json=json, quiet=quiet, strict=strict)
+        return
+    refuse_several(several, "nights")
+    night = _reduced(campaign[0], out, air_model, quiet)
     files = "report.html, ranges.csv, coordinates.csv, coordinates.json, surface.csv, pose.json, provenance.json"
     _tell(night, f"{out}/: {files}", json=json, quiet=quiet, strict=strict)
 

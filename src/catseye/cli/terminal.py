@@ -19,6 +19,7 @@ INTERVAL = 0.1  # s between two refreshes of the progress line
 FIRST_LINE, BETWEEN_LINES = 10.0, 10.0  # s until progress is told where stderr is no terminal, and between its lines
 BEAT = 1.0  # s between two looks at a step that is silent
 SURE = 2.0  # s of a step before its end is predicted
+SLOW = 3.0  # times the mean of its parts, for which a step may be silent
 
 _for_programs: ContextVar[bool] = ContextVar("for_programs", default=False)  # the running command has `--json`
 
@@ -152,6 +153,11 @@ class ProgressLine:
             self._beat = threading.Thread(target=self._repeat, name="catseye-progress", daemon=True)
             self._beat.start()
 
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Done, and of how many, as it was last said."""
+        return self._counts
+
     def clear(self) -> None:
         """Wipe the line; nothing more is said until there is more progress."""
         if self._beat is not None:
@@ -179,13 +185,17 @@ class ProgressLine:
             self._write(f"{what} {done}{f' of {total}' if total else ''}{self._left(now, done, total)}\n")
 
     def _left(self, now: float, done: int, total: int) -> str:
-        """Time that the step has taken and may still take; of a silent step, the time since it began."""
+        """Time that the step has taken and may still take; of a silent step, the time since it began.
+
+        A step that is silent for no longer than its parts take is as far as its last part says.
+        """
         passed, silent = now - self._start, now - self._since
-        if silent >= SURE:
+        each = (self._since - self._start) / done if done else 0.0
+        if silent >= max(SURE, SLOW * each):
             return f", for {duration(silent)}"
         if not 0 < done < total or passed < SURE:
             return ""
-        return f", {duration(passed)}, some {duration(passed * (total - done) / done)} left"
+        return f", {duration(passed)}, some {duration(max(each * (total - done) - silent, 0.0))} left"
 
     def _write(self, text: str) -> None:
         with suppress(OSError):

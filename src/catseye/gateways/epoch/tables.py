@@ -11,6 +11,7 @@ from catseye.gateways.writers.columns import Column, Table
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.range_shots import RangeShots
 from catseye.reduction.epoch.surface import DishFit
+from catseye.reduction.site.point_kinds import point_kinds
 from catseye.signal.cycles.whole import unwrapped_length
 
 PAGE = "results.md"
@@ -293,22 +294,5 @@ def surface_csv(reduction: Reduction) -> str:
 
 def kinds_of(reduction: Reduction) -> dict[str, str]:
     """Kind of each point, in a word or two, in the points' order."""
-    campaign, places = reduction.campaign, reduction.coordinates.places
-    at_triplets = {target for triplet in campaign.triplets.values() for target in triplet.targets}
-    at_benchmarks = {benchmark.target for benchmark in campaign.benchmarks}
-
-    def kind(name: str) -> str:
-        if name not in places:
-            return "fixed point"
-        if name in campaign.monuments:
-            return "ground ranger"
-        retroreflector = places[name].kind
-        if retroreflector is None:
-            return "feed-arm ranger"
-        if name in at_triplets:
-            return f"triplet {retroreflector.name}"
-        if name in at_benchmarks:
-            return "benchmark"
-        return "dish prism" if retroreflector.shapes_dish else "structure"
-
-    return {name: kind(name) for name in reduction.coordinates.points}
+    coordinates = reduction.coordinates
+    return point_kinds(reduction.campaign, coordinates.points, coordinates.places)

@@ -1,0 +1,1 @@
+"""Functions for many nights, runs and years."""

@@ -1,0 +1,1 @@
+"""Writing of an archive: tables, samples, inputs, index."""

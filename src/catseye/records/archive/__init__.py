@@ -1,0 +1,1 @@
+"""Archive of nights: layout, index, tables, codec of samples, verification."""

@@ -1,0 +1,1 @@
+"""Archiving: sources to units of work, each of which puts one night into an archive."""
