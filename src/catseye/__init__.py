@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from catseye.api.result import save, show
     from catseye.api.scale.archive import archive, restore
     from catseye.api.scale.many import reduce_nights
+    from catseye.api.scale.trends import trends
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
@@ -77,6 +78,7 @@ FACE = {  # file of catseye.api -> its exported names
     "result": ("save", "show"),
     "scale.archive": ("archive", "restore"),
     "scale.many": ("reduce_nights",),
+    "scale.trends": ("trends",),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
@@ -141,6 +143,7 @@ __all__ = [
     "surface",
     "track",
     "track_pointing",
+    "trends",
     "triplet",
 ]
 

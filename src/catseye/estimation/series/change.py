@@ -9,6 +9,7 @@ which is an upper bound for any dependence, and close, as neighbouring times sha
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -79,9 +80,7 @@ def scan_steps(
     return SeriesFit(**joined(fits)), StepScan(**joined(scans))
 
 
-def _scanned(
-    group: SeriesGroup, functions: Array, noise: SeriesNoise, limit: float
-) -> tuple[SeriesFit, StepScan]:
+def _scanned(group: SeriesGroup, functions: Array, noise: SeriesNoise, limit: float) -> tuple[SeriesFit, StepScan]:
     t, s, d = group.values.shape
     found = filtered(group, functions, noise)
     fit, inverse = solved(group, functions, found)
@@ -159,17 +158,16 @@ def _correlations(information: Array, cross: Array, possible: np.ndarray, own: A
     Where a time between is not possible, its statistics count as independent: an upper bound.
     """
     d = information.shape[-1]
-    values = []
-    at = np.flatnonzero(possible)
-    for i, j in zip(at[:-1], at[1:], strict=True):
+    values: list[float] = []
+    for i, j in pairwise(np.flatnonzero(possible).tolist()):
         if j != i + 1:
-            values.append(np.zeros(1) if _changed(own, i, j) else np.ones(1))
+            values.append(0.0 if _changed(own, i, j) else 1.0)
             continue
         left, right = np.linalg.cholesky(information[i]), np.linalg.cholesky(information[j])
         inner = np.linalg.solve(left, cross[i])
         inner = np.linalg.solve(right, inner.T)
-        values.append(np.linalg.svd(inner.reshape(d, d), compute_uv=False)[-1:])
-    return np.concatenate(values) if values else np.zeros(0)
+        values.append(float(np.linalg.svd(inner.reshape(d, d), compute_uv=False)[-1]))
+    return np.array(values)
 
 
 def _changed(own: Array, i: int, j: int) -> bool:

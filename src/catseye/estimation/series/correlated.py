@@ -1,6 +1,7 @@
 """Functions of time fitted to many series at once, with noise that lasts from one reading to the next.
 
-    y_t = sum_a F_ta c_a + w_t + x_t,     cov(w_t) = R_t + diag(white^2),     cov(x_s, x_t) = diag(wander^2 exp(-|t - s|/days))
+    y_t = sum_a F_ta c_a + w_t + x_t,     cov(w_t) = R_t + diag(white^2),
+                                          cov(x_s, x_t) = diag(wander^2 exp(-|t - s|/days))
 
 with d components of each reading (a zero: 1, a point: 3, a rigid motion: 6). A Kalman filter turns readings and
 functions into innovations, so that the exact weighted least squares takes time proportional to the readings; its
@@ -67,11 +68,20 @@ class SeriesGroup:
     @property
     def present(self) -> np.ndarray:
         """True (T, S) where there is a reading."""
-        return np.isfinite(self.values).all(axis=2) & np.isfinite(self.covariance).all(axis=(2, 3))
+        return measured(self.values) & measured(self.covariance.reshape(*self.values.shape[:2], -1))
 
     def part(self, series: np.ndarray) -> "SeriesGroup":
         """Some of the series."""
         return SeriesGroup(self.days, self.values[:, series], self.covariance[:, series])
+
+
+def measured(values: Array) -> np.ndarray:
+    """True (...) where all of the last axis is finite.
+
+    >>> measured(np.array([[1.0, 2.0], [np.nan, 0.0]])).tolist()
+    [True, False]
+    """
+    return np.asarray(np.isfinite(values).all(axis=-1), dtype=bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +111,7 @@ class SeriesFit:
     pvv                  (S,) weighted squares of the residuals
     degrees_of_freedom   (S,)
     logarithm            (S,) restricted log likelihood, without a constant
+    likelihood           (S,) log likelihood, without a constant
     residual             (T, S, d); NaN where there is no reading
     """
 
@@ -109,6 +120,7 @@ class SeriesFit:
     pvv: Array
     degrees_of_freedom: Array
     logarithm: Array
+    likelihood: Array
     residual: Array
 
     @property
@@ -136,7 +148,8 @@ def fit_series(group: SeriesGroup, functions: Array, noise: SeriesNoise) -> Seri
 
     >>> days = np.arange(5.0)
     >>> group = SeriesGroup(days, (2.0 + 3.0 * days)[:, None, None], np.ones((5, 1, 1, 1)))
-    >>> fit_series(group, np.column_stack([np.ones(5), days]), SeriesNoise.of(1)).coefficients[0, :, 0].round(9).tolist()
+    >>> fit = fit_series(group, np.column_stack([np.ones(5), days]), SeriesNoise.of(1))
+    >>> fit.coefficients[0, :, 0].round(9).tolist()
     [2.0, 3.0]
     """
     return solved(group, _by_series(functions, group), filtered(group, _by_series(functions, group), noise))[0]
@@ -166,6 +179,7 @@ def solved(group: SeriesGroup, functions: Array, found: Filtered) -> tuple[Serie
         pvv=pvv,
         degrees_of_freedom=d * present.sum(axis=0) - count,
         logarithm=-0.5 * (found.logarithm + logarithm + pvv),
+        likelihood=-0.5 * (found.logarithm + pvv),
         residual=np.where(present[:, :, None], group.values - predicted, np.nan),
     )
     return fit, inverse
@@ -271,7 +285,8 @@ def inverse_of(spread: Array) -> tuple[Array, Array]:
         return 1.0 / spread, np.log(spread[..., 0, 0])
     if spread.shape[-1] == 3:
         return _inverse_of_three(spread)
-    return np.linalg.inv(spread), np.linalg.slogdet(spread)[1]
+    inverse: Array = np.linalg.inv(spread)
+    return inverse, np.linalg.slogdet(spread)[1]
 
 
 def _inverse_of_three(q: Array) -> tuple[Array, Array]:

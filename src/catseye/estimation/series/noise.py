@@ -8,11 +8,12 @@ from catseye.aliases import Array
 from catseye.estimation.series.change import scan_steps
 from catseye.estimation.series.correlated import SeriesGroup, SeriesNoise, fit_series
 
-MOST_READINGS = 12_000  # whose likelihoods are added up: more change a common strength by a percent or two
+MOST_READINGS = 6_000  # whose likelihoods are added up: more change a common strength by a percent or two
 BLOCKS = (2, 4, 8, 16, 32, 64)  # readings of a mean: its variance shows noise that lasts
-SURE = 3.0  # standard deviations of that variance
+SURE = 1.5  # standard deviations of that variance
 LEAST_DEGREES = 8  # readings less coefficients: fewer tell no noise
-LEAST_GAIN = 4.0  # of the log likelihood, by two parameters of a wander
+LEAST_GAIN = 1.0  # of the log likelihood, by two parameters of a wander
+PLENTY = 5000  # readings: of fewer, means of some tell too little whether noise lasts
 WORTH = 0.05  # of the readings' scatter: a smaller noise is none
 WINDOW = 9  # readings of a running median
 MAD = 1.4826  # from a median absolute deviation to a standard deviation of the normal distribution
@@ -25,11 +26,16 @@ def noise_of(group: SeriesGroup, functions: Array) -> SeriesNoise:
     group       the series; an even selection of them counts
     functions   (T, k) or (T, S, k)
 
-    White alone unless a wander raises the likelihood clearly. No noise where readings are few.
+    White alone unless a wander raises the likelihood more than by chance. No noise where readings are few.
 
     Source: [PATTERSON71]; the likelihoods of the series are added.
     """
-    d, at = group.values.shape[2], _selection(group)
+    d = group.values.shape[2]
+    if d > 1:  # each component as a series: what they share changes a common strength little
+        single, wide = _by_component(group, functions)
+        noise = noise_of(single, wide)
+        return SeriesNoise.of(d, float(noise.white[0]), float(noise.wander[0]), float(noise.days[0]))
+    at = _selection(group)
     part, rows = group.part(at), functions if functions.ndim == 2 else functions[:, at]
     fit = fit_series(part, rows, SeriesNoise.of(d))
     enough = fit.degrees_of_freedom >= LEAST_DEGREES
@@ -47,18 +53,19 @@ def noise_of(group: SeriesGroup, functions: Array) -> SeriesNoise:
     def white_cost(x: Array) -> float:
         return cost(scatter * float(np.exp(x[0])), 0.0, 1.0)
 
-    plain = _least(white_cost, [np.array([v]) for v in (-3.0, -1.0, 0.0)], size=0.5)
-    white = scatter * float(np.exp(plain[0]))
+    whitest = _least(white_cost, [np.array([v]) for v in (-3.0, -1.0, 0.0)], size=0.5)
+    white = scatter * float(np.exp(whitest[0]))
     best = min(cost(white, 0.0, 1.0), cost(0.0, 0.0, 1.0))
     if cost(0.0, 0.0, 1.0) - best < 0.5:
         white = 0.0
-    if span < 4.0 * step or not _lasts(fit_series(part, rows, SeriesNoise.of(d, white)).residual):
+    plain = fit_series(part, rows, SeriesNoise.of(d, white)).residual
+    if span < 4.0 * step or (plain.size > PLENTY and not _lasts(plain)):
         return SeriesNoise.of(d, white if white > WORTH * scatter else 0.0)
 
     def full_cost(x: Array) -> float:
         if not (np.log(0.5 * step) <= x[2] <= np.log(span) and max(x[:2]) < 3.0):
             return np.inf
-        return cost(*(scatter * np.exp(x[:2])), float(np.exp(x[2])))
+        return cost(scatter * float(np.exp(x[0])), scatter * float(np.exp(x[1])), float(np.exp(x[2])))
 
     starts = [np.array([-0.7, -0.4, np.log(days)]) for days in (3.0 * step, np.sqrt(3.0 * step * span), 0.5 * span)]
     lasting = _least(full_cost, starts, size=0.7)
@@ -80,6 +87,16 @@ def noise_beside_steps(group: SeriesGroup, functions: Array) -> SeriesNoise:
     _, scan = scan_steps(part, rows, SeriesNoise.of(group.values.shape[2]), limit=0.0)
     steps = (np.arange(t)[:, None] >= scan.at) & (scan.at >= 0)
     return noise_of(part, np.concatenate([rows, steps[:, :, None]], axis=2))
+
+
+def _by_component(group: SeriesGroup, functions: Array) -> tuple[SeriesGroup, Array]:
+    """Components of some series as series of their own, with their functions."""
+    at = _selection(group)
+    part, rows = group.part(at), functions if functions.ndim == 2 else functions[:, at]
+    t, s, d = part.values.shape
+    variance = np.einsum("tsii->tsi", part.covariance).reshape(t, s * d, 1, 1)
+    wide = rows if rows.ndim == 2 else np.repeat(rows, d, axis=1)
+    return SeriesGroup(part.days, part.values.reshape(t, s * d, 1), variance), wide
 
 
 def _selection(group: SeriesGroup) -> np.ndarray:
@@ -131,7 +148,8 @@ def outliers(residual: Array, u: Array, *, probability: float) -> np.ndarray:
     count = max(int(np.isfinite(residual).sum()), 1)
     limit = -float(ndtri(min(0.5 * probability / count, 0.25)))
     with np.errstate(invalid="ignore"):
-        return (np.abs(away) > limit * MEDIAN_EXCESS * np.maximum(typical, 1.0)).any(axis=2)
+        far = np.abs(away) > limit * MEDIAN_EXCESS * np.maximum(typical, 1.0)
+    return np.asarray(far.any(axis=2), dtype=bool)
 
 
 def running_median(values: Array) -> Array:
@@ -184,5 +202,5 @@ def _least(cost: Callable[[Array], float], starts: list[Array], *, size: float) 
 
     start = min(starts, key=cost)
     simplex = np.vstack([start, start + size * np.eye(len(start))])
-    options = {"initial_simplex": simplex, "xatol": 0.03, "fatol": 0.2, "maxfev": 50 * len(start)}
+    options = {"initial_simplex": simplex, "xatol": 0.05, "fatol": 0.3, "maxfev": 30 * len(start)}
     return minimize(cost, start, method="Nelder-Mead", options=options).x

@@ -11,6 +11,7 @@ from catseye.estimation.series.noise import noise_beside_steps, noise_of
 
 PASSES = 6  # of scan and noise
 MOST = 8  # steps of one series
+ALIKE = 0.1  # of the noise: two estimates that differ by less are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,9 @@ def fit_with_steps(
     noise          known; None: estimated, common to the series
     by_component   estimate the noise of each component of a reading by itself: for motions of a body
 
+    Steps and noise that lasts explain the same readings: the search starts once from all as noise, once from the
+    likeliest step of each series, and the better end by an information criterion is taken.
+
     >>> days = np.arange(60.0)
     >>> values = np.where(days < 30, 0.0, 1.0)[:, None, None] + 0.1 * np.sin(7.0 * days**2)[:, None, None]
     >>> group = SeriesGroup(days, values, np.full((60, 1, 1, 1), 0.01))
@@ -77,15 +81,28 @@ def fit_with_steps(
     >>> [(step.at, round(float(step.size[0]), 1)) for step in found.steps]
     [(30, 1.0)]
     """
-    s = group.values.shape[1]
-    known = noise is not None
-    using = noise if noise is not None else _noise(group, functions, by_component=by_component, first=True)
-    times: list[tuple[int, ...]] = [()] * s
+    if noise is not None:
+        return _searched(group, functions, noise, probability, by_component=None)
+    quiet = _noise(group, functions, by_component=by_component)
+    found = _searched(group, functions, quiet, probability, by_component=by_component)
+    sharp = _noise(group, functions, by_component=by_component, beside=True)
+    if _alike(quiet, sharp):
+        return found
+    other = _searched(group, functions, sharp, probability, by_component=by_component)
+    return min((found, other), key=lambda one: _criterion(one, group, probability))
+
+
+def _searched(
+    group: SeriesGroup, functions: Array, noise: SeriesNoise, probability: float, *, by_component: bool | None
+) -> SteppedFit:
+    """Fit whose steps are found from a noise at first, which is then estimated anew; None: it stays."""
+    using = noise
+    times: list[tuple[int, ...]] = [()] * group.values.shape[1]
     for _ in range(PASSES):
         _, scan = _scan(group, functions, times, using, probability)
-        new = [i for i in np.flatnonzero(scan.probability < probability) if len(times[i]) < MOST]
-        extended = [tuple(sorted({*times[i], int(scan.at[i])})) if i in set(new) else times[i] for i in range(s)]
-        if not known:
+        new = {int(i) for i in np.flatnonzero(scan.probability < probability) if len(times[i]) < MOST}
+        extended = [tuple(sorted({*own, int(scan.at[i])})) if i in new else own for i, own in enumerate(times)]
+        if by_component is not None and extended != times:
             using = _noise(group, _rows(group, functions, extended), by_component=by_component)
         checked = _confirmed(group, functions, extended, using, probability)
         if checked == times:
@@ -95,12 +112,36 @@ def fit_with_steps(
     return SteppedFit(fit, using, _steps(group, functions, times, using, probability), scan)
 
 
-def _noise(group: SeriesGroup, functions: Array, *, by_component: bool, first: bool = False) -> SeriesNoise:
-    estimate = noise_beside_steps if first else noise_of
+def _alike(one: SeriesNoise, other: SeriesNoise) -> bool:
+    """True if two noises differ by too little to matter for steps."""
+    total = np.hypot(np.hypot(one.white, one.wander), np.hypot(other.white, other.wander))
+    near = np.abs(one.wander - other.wander) <= ALIKE * total
+    return bool(np.all(near & (np.abs(one.white - other.white) <= ALIKE * total)))
+
+
+def _criterion(found: SteppedFit, group: SeriesGroup, probability: float) -> float:
+    """Bayesian information criterion: steps against a noise that lasts.
+
+    A step costs its components, its time, and the odds against one in a series.
+
+    Source: [SCHWARZ78].
+    """
+    t, _, d = group.values.shape
+    each = np.log(max(d * int(group.present.sum()), 2))
+    steps = len(found.steps) * (d * each + 2.0 * np.log(t) - 2.0 * np.log(probability))
+    strengths = 2 * int(np.count_nonzero(found.noise.wander)) + int(np.count_nonzero(found.noise.white))
+    return float(steps + strengths * each - 2.0 * found.fit.likelihood.sum())
+
+
+def _noise(group: SeriesGroup, functions: Array, *, by_component: bool, beside: bool = False) -> SeriesNoise:
+    estimate = noise_beside_steps if beside else noise_of
     if not by_component:
         return estimate(group, functions)
     parts = [
-        estimate(SeriesGroup(group.days, group.values[..., i : i + 1], group.covariance[..., i : i + 1, i : i + 1]), functions)
+        estimate(
+            SeriesGroup(group.days, group.values[..., i : i + 1], group.covariance[..., i : i + 1, i : i + 1]),
+            functions,
+        )
         for i in range(group.values.shape[2])
     ]
     return SeriesNoise(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("white", "wander", "days")))
@@ -137,7 +178,9 @@ def _scan(
     def joined(values: list[SeriesFit] | list[StepScan]) -> dict[str, Array]:
         axes = {"residual": 1, "profile": 1}
         return {
-            name: np.take(np.concatenate([vars(v)[name] for v in values], axis=(axis := axes.get(name, 0))), order, axis)
+            name: np.take(
+                np.concatenate([vars(v)[name] for v in values], axis=(axis := axes.get(name, 0))), order, axis
+            )
             for name in vars(values[0])
         }
 
@@ -148,7 +191,7 @@ def _confirmed(
     group: SeriesGroup, functions: Array, times: list[tuple[int, ...]], noise: SeriesNoise, probability: float
 ) -> list[tuple[int, ...]]:
     """Times of the steps that are significant, each beside the others of its series."""
-    confirmed = [()] * len(times)
+    confirmed: list[tuple[int, ...]] = [()] * len(times)
     for i, own in enumerate(times):
         if own:
             part = group.part(np.array([i]))

@@ -15,16 +15,16 @@ import numpy as np
 from catseye.aliases import Array
 from catseye.errors import InputError
 from catseye.estimation.harmonic.body import rigid_design
-from catseye.estimation.series.correlated import SeriesGroup, SeriesNoise, fit_series
+from catseye.estimation.series.correlated import SeriesGroup, SeriesNoise, fit_series, measured
 from catseye.estimation.series.noise import outliers
-from catseye.estimation.series.steps import Step, SteppedFit, fit_with_steps
+from catseye.estimation.series.steps import SteppedFit, fit_with_steps
 from catseye.reduction.structure.group import Nominal, carrier_of
 from catseye.reduction.trends.functions import TrendFunctions, separated_functions
 from catseye.reduction.trends.rigid import NightlyMotion, determines_motion, nightly_motion
 
 FRAMES = ("ground", "alidade", "reflector")
 CALMER = 0.7  # of the scatter in a frame nearer the ground: less is needed to belong to a farther frame
-FEW_POINTS = 50  # of a body: among fewer, a step of one is seen in the others too
+FEW_POINTS = 500  # of a body: among fewer, a step of one is seen in the others too
 LARGEST_SHARE = 0.5  # of the largest step of such a body: smaller ones wait for the next pass
 PASSES = 6
 OUTLIER = 0.01  # probability that any reading of a body is called one without cause
@@ -108,8 +108,11 @@ class MotionTrend:
 
     @property
     def night_u(self) -> Array:
-        """Standard deviation (6,) of a night's motion that no function predicts, m and rad."""
-        return np.hypot(self.found.noise.white, self.found.noise.wander) * self.scale
+        """Standard uncertainty (6,) of one night's motion, scatter included, m and rad."""
+        with np.errstate(invalid="ignore"):
+            claimed = _mean(np.einsum("tii->ti", self.covariance))
+        noise = self.found.noise.white**2 + self.found.noise.wander**2
+        return np.sqrt(claimed + noise * self.scale**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +198,7 @@ def bodies_in_frames(points: BodyPoints, nominal: Nominal) -> list[tuple[str, Bo
         at = best == i
         if at.any():
             used = known if frame != "ground" else np.ones(len(points.mjd), bool)
-            some = np.isfinite(points.x[:, at]).all(axis=2).any(axis=1)
+            some = measured(points.x[:, at]).any(axis=1)
             name = f"{points.name} ({frame})" if several else points.name
             found.append((frame, points.part(used & some, at, name)))
     return found
@@ -215,7 +218,6 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
         points.elevation,
         points.temperature_c,
         points.mjd,
-        posture=frame != "ground",
         harmonics=settings.harmonics,
         annual=settings.annual,
     )
@@ -226,7 +228,7 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
     place = _mean(x)
     middle = np.nanmean(place, axis=0)
     rows = functions.rows(points.elevation, points.temperature_c, points.mjd)
-    if int(np.isfinite(x).all(axis=2).sum(axis=0).max(initial=0)) <= len(functions.names):
+    if int(measured(x).sum(axis=0).max(initial=0)) <= len(functions.names):
         raise InputError(
             f"{points.name}: no point has more than {len(functions.names)} nights (expected more than the functions of "
             "its model)"
@@ -238,7 +240,8 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
     outlier = np.zeros(y.shape[:2], bool)
     own, motion, found = None, None, None
     for _ in range(PASSES if moving and len(arms) < FEW_POINTS else 1):
-        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving)
+        noise = None if own is None else own.noise
+        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving, noise)
         fresh = own.steps
         if not fresh or not moving or len(arms) >= FEW_POINTS:
             break
@@ -247,7 +250,7 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
             if np.linalg.norm(step.size) >= LARGEST_SHARE * largest:
                 known[step.at :, step.series] += step.size
     else:
-        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving)
+        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving, own.noise)
     assert own is not None
     group = _group(points.mjd, motion, y - known, covariance, outlier)
     if known.any():  # the known steps are fitted again, with all else
@@ -263,7 +266,9 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
         place=place,
         middle=middle,
         motion=found,
-        displacement=group.values if motion is None else np.where(outlier[..., None], motion.residual + known, group.values),
+        displacement=group.values
+        if motion is None
+        else np.where(outlier[..., None], motion.residual + known, group.values),
         spread=group.covariance,
         own=own,
         outlier=outlier,
@@ -271,7 +276,14 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
 
 
 def _points_fit(
-    mjd: Array, y: Array, covariance: Array, arms: Array, rows: Array, settings: TrendSettings, moving: bool
+    mjd: Array,
+    y: Array,
+    covariance: Array,
+    arms: Array,
+    rows: Array,
+    settings: TrendSettings,
+    moving: bool,
+    noise: SeriesNoise | None,
 ) -> tuple[SteppedFit, NightlyMotion | None, np.ndarray]:
     """Fit of each point, the motion of the nights, and outliers (T, n)."""
     motion, scatter, shape = None, 0.0, np.zeros_like(y)
@@ -283,7 +295,7 @@ def _points_fit(
             motion = nightly_motion(np.where(outlier[..., None], np.nan, y) - shape, covariance, arms, scatter=scatter)
             motion = _with_all(motion, y - shape, arms, covariance)
             group = SeriesGroup(mjd, motion.residual + shape, motion.spread)
-        residual, shape = _robust_residual(group, rows, white, outlier)
+        residual, shape = _robust_residual(group, rows, white, outlier, arms if moving else None)
         u = np.sqrt(np.maximum(np.einsum("tnii->tni", covariance), 0.0))
         total = np.sqrt(np.maximum(np.einsum("tnii->tni", group.covariance), 0.0) + scatter**2)
         outlier = outliers(residual, total, probability=OUTLIER)
@@ -297,14 +309,14 @@ def _points_fit(
         motion = _with_all(motion, y - shape, arms, covariance)
         motion = NightlyMotion(motion.six, motion.covariance, motion.residual + shape, motion.spread)
     group = _group(mjd, motion, y, covariance, outlier)
-    return fit_with_steps(group, rows, probability=settings.probability), motion, outlier
+    return fit_with_steps(group, rows, probability=settings.probability, noise=noise), motion, outlier
 
 
 def _with_all(motion: NightlyMotion, y: Array, arms: Array, covariance: Array) -> NightlyMotion:
     """Motion with residuals of the outliers too."""
     left = y - np.einsum("nij,tj->tni", rigid_design(arms), motion.six)
-    known = np.isfinite(motion.residual).all(axis=2)
-    spread = np.where((known | ~np.isfinite(left).all(axis=2))[..., None, None], motion.spread, covariance)
+    known = measured(motion.residual)
+    spread = np.where((known | ~measured(left))[..., None, None], motion.spread, covariance)
     return NightlyMotion(
         six=motion.six,
         covariance=motion.covariance,
@@ -313,20 +325,29 @@ def _with_all(motion: NightlyMotion, y: Array, arms: Array, covariance: Array) -
     )
 
 
-def _group(
-    mjd: Array, motion: NightlyMotion | None, y: Array, covariance: Array, outlier: np.ndarray
-) -> SeriesGroup:
+def _group(mjd: Array, motion: NightlyMotion | None, y: Array, covariance: Array, outlier: np.ndarray) -> SeriesGroup:
     """Series of the points without their outliers."""
     values, spread = (y, covariance) if motion is None else (motion.residual, motion.spread)
     return SeriesGroup(mjd, np.where(outlier[..., None], np.nan, values), spread)
 
 
-def _robust_residual(group: SeriesGroup, rows: Array, noise: SeriesNoise, outlier: np.ndarray) -> tuple[Array, Array]:
-    """Residuals of all readings from a fit without the outliers, and the fitted values."""
+def _robust_residual(
+    group: SeriesGroup, rows: Array, noise: SeriesNoise, outlier: np.ndarray, arms: Array | None
+) -> tuple[Array, Array]:
+    """Residuals of all readings from a fit without the outliers, and the points' own displacements.
+
+    arms   of the points; the body's part of the fit, as most points show it, is not their own; None: no body
+    """
     clean = SeriesGroup(group.days, np.where(outlier[..., None], np.nan, group.values), group.covariance)
     fit = fit_series(clean, rows, noise)
-    model = np.einsum("tk,nkd->tnd", rows, np.nan_to_num(fit.coefficients))
-    return group.values - model, model
+    theta = np.nan_to_num(fit.coefficients)
+    residual = group.values - np.einsum("tk,nkd->tnd", rows, theta)
+    if arms is not None:
+        by_function = np.moveaxis(fit.coefficients, 1, 0)
+        spread = np.moveaxis(fit.u, 1, 0)[..., None] ** 2 * np.eye(3)
+        six = np.nan_to_num(nightly_motion(by_function, spread, arms).six)
+        theta = theta - np.einsum("nij,kj->nki", rigid_design(arms), six)
+    return residual, np.einsum("tk,nkd->tnd", rows, theta)
 
 
 def _motion_fit(mjd: Array, motion: NightlyMotion, rows: Array, settings: TrendSettings) -> MotionTrend:
@@ -364,7 +385,7 @@ def _mean(values: Array) -> Array:
 def _scatter(x: Array) -> Array:
     """Root mean square (n,) of places about their mean; infinity for fewer than two."""
     away = x - _mean(x)
-    known = np.isfinite(away).all(axis=2)
+    known = measured(away)
     square = np.where(known, np.sum(np.where(known[..., None], away, 0.0) ** 2, axis=2), 0.0).sum(axis=0)
     count = known.sum(axis=0)
     return np.where(count > 1, np.sqrt(square / np.maximum(count, 1)), np.inf)

@@ -61,13 +61,17 @@ def separated_functions(
     span = float(np.ptp(mjd)) if len(mjd) else 0.0
     asked = [TEMPERATURE, YEAR, *(WAVES[: 2 * harmonics] if posture else ()), *(ANNUAL if annual else ())]
     possible = {
-        TEMPERATURE: bool(np.isfinite(temperature_c).all()) and len(mjd) > 1 and np.std(temperature_c) > LEAST_TEMPERATURE,
+        TEMPERATURE: bool(np.isfinite(temperature_c).all())
+        and len(mjd) > 1
+        and np.std(temperature_c) > LEAST_TEMPERATURE,
         YEAR: span >= LEAST_SPAN,
         **dict.fromkeys(ANNUAL, span >= LEAST_ANNUAL * DAYS_PER_YEAR),
         **dict.fromkeys(WAVES, len(mjd) > 1 and bool(np.std(elevation) > LEAST_ELEVATION)),
     }
     names, omitted = [CONSTANT], []
-    values = {name: _values((name,), elevation, temperature_c, mjd, reference_c, reference_mjd)[..., 0] for name in asked}
+    values = {
+        name: _values((name,), elevation, temperature_c, mjd, reference_c, reference_mjd)[..., 0] for name in asked
+    }
     for group in _groups(asked):
         trial = [*names, *group]
         sound = all(possible[name] for name in group) and len(mjd) >= NIGHTS_EACH * len(trial)
@@ -107,7 +111,9 @@ def _separate(rows: Array, count: int) -> bool:
 def _values(
     names: tuple[str, ...], elevation: Array, temperature_c: Array, mjd: Array, reference_c: float, reference_mjd: float
 ) -> Array:
-    elevation, temperature_c, mjd = np.broadcast_arrays(*(np.asarray(v, float) for v in (elevation, temperature_c, mjd)))
+    elevation, temperature_c, mjd = np.broadcast_arrays(
+        *(np.asarray(v, float) for v in (elevation, temperature_c, mjd))
+    )
     posture = TelescopePosture(np.zeros_like(elevation), elevation, temperature_c)
     years = (mjd - reference_mjd) / DAYS_PER_YEAR
     columns = []

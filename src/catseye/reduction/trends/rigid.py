@@ -10,7 +10,7 @@ import numpy as np
 
 from catseye.aliases import Array
 from catseye.estimation.harmonic.body import rigid_design, rigid_part
-from catseye.estimation.series.correlated import inverse_of
+from catseye.estimation.series.correlated import inverse_of, measured
 
 FEWEST = 6  # points of a body: of fewer each point is looked at by itself
 FEWEST_NIGHT = 4  # points of a night
@@ -49,7 +49,7 @@ def nightly_motion(displacement: Array, covariance: Array, arms: Array, *, scatt
     arms           (n, 3) m, from the middle of the points
     scatter        m, of each coordinate beyond the covariance
 
-    Source: [RAO73] section 4a; [HUBER64] for the weights; leave-one-out residuals by (V - A)^-1, A the motion's part.
+    Source: [RAO73] section 4a; [HUBER09] for the weights; leave-one-out residuals by (V - A)^-1, A the motion's part.
     """
     count = max(1, BLOCK // max(1, len(arms)))
     blocks = [slice(i, i + count) for i in range(0, len(displacement), count)]
@@ -59,7 +59,7 @@ def nightly_motion(displacement: Array, covariance: Array, arms: Array, *, scatt
 
 def _motion(displacement: Array, covariance: Array, arms: Array, scatter: float) -> NightlyMotion:
     """Motion of some nights, all at once."""
-    present = np.isfinite(displacement).all(axis=2)
+    present = measured(displacement)
     y = np.where(present[..., None], displacement, 0.0)
     base = np.where(present[..., None, None], covariance + scatter**2 * np.eye(3), np.eye(3))
     r = rigid_design(arms)
@@ -86,12 +86,12 @@ def _motion(displacement: Array, covariance: Array, arms: Array, scatter: float)
         outer = effective @ _inverse(effective - part * shared[..., None, None])
         residual = np.einsum("tnij,tnj->tni", outer, left)
         spread = outer @ effective - effective + base - scatter**2 * np.eye(3)
-    measured = present & good[:, None] & positive(spread)
+    usable = present & good[:, None] & positive(spread)
     return NightlyMotion(
         six=np.where(good[:, None], six, np.nan),
         covariance=np.where(good[:, None, None], inner, np.nan),
-        residual=np.where(measured[..., None], residual, np.nan),
-        spread=np.where(measured[..., None, None], spread, np.nan),
+        residual=np.where(usable[..., None], residual, np.nan),
+        spread=np.where(usable[..., None, None], spread, np.nan),
     )
 
 
