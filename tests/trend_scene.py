@@ -27,7 +27,10 @@ class BodyTruth:
 
 
 def simulated_body(nights=150, points=24, seed=1, *, frame="reflector", wind=2e-4, steps=None, outliers=0.003):
-    """Points in the ground frame, and the truth. Covariances differ between nights; a tenth of the readings is absent."""
+    """Points in the ground frame, and the truth.
+
+    Covariances differ between nights; a tenth of the readings is absent.
+    """
     rng = np.random.default_rng(seed)
     mjd = 61000.3 + np.sort(rng.choice(int(1.3 * nights), nights, replace=False))
     azimuth, elevation = rng.uniform(0.0, 6.0, nights), np.radians(rng.uniform(15.0, 85.0, nights))

@@ -53,7 +53,7 @@ def test_planted_truths_come_back():
 
 
 def test_claims_are_those_that_scatter():
-    """Five bodies: departures over claims scatter by one; all points of a body share its motion, so 20 % are allowed."""
+    """Departures of five bodies over their claims: one, to 20 %, as all points of a body share its motion."""
     ratios = []
     for seed in range(5):
         points, truth = simulated_body(nights=100, points=12, seed=20 + seed)

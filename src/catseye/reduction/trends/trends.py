@@ -193,7 +193,7 @@ def _chosen(bodies: Sequence[str] | None, names: Sequence[str]) -> set[str]:
     for pattern in bodies:
         if not any(fnmatchcase(name, pattern) for name in names):
             listed = ", ".join(dict.fromkeys(names)) or "none"
-            raise ArgumentError(f"body {pattern!r} is not in the archive (expected one of {listed})", "bodies")
+            raise ArgumentError(f"bodies = {pattern!r}: not in the archive (expected one of {listed})", "bodies")
     return {name for name in names if any(fnmatchcase(name, pattern) for pattern in bodies)}
 
 
