@@ -146,7 +146,7 @@ class TrendsResult(Result):
         )
 
     def _points(self) -> "QTable":
-        """A row a point."""
+        """Points with drifts, a row a point."""
         from catseye.reduction.trends.instruments import drift_probability
 
         bodies = self.found.bodies
@@ -220,7 +220,7 @@ class TrendsResult(Result):
         return self.hashes
 
     def sources(self) -> tuple[Path, ...]:
-        """Archive that was read."""
+        """Directory of the archive that was read."""
         return (self.archive,)
 
 

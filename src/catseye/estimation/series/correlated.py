@@ -71,7 +71,7 @@ class SeriesGroup:
         return measured(self.values) & measured(self.covariance.reshape(*self.values.shape[:2], -1))
 
     def part(self, series: np.ndarray) -> "SeriesGroup":
-        """Some of the series."""
+        """Group of some of the series."""
         return SeriesGroup(self.days, self.values[:, series], self.covariance[:, series])
 
 
@@ -285,8 +285,7 @@ def inverse_of(spread: Array) -> tuple[Array, Array]:
         return 1.0 / spread, np.log(spread[..., 0, 0])
     if spread.shape[-1] == 3:
         return _inverse_of_three(spread)
-    inverse: Array = np.linalg.inv(spread)
-    return inverse, np.linalg.slogdet(spread)[1]
+    return np.asarray(np.linalg.inv(spread), dtype=float), np.linalg.slogdet(spread)[1]
 
 
 def _inverse_of_three(q: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ ALIKE = 0.1  # of the noise: two estimates that differ by less are one
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class SeriesStep:
     """Step of one series.
 
     series        index of the series
@@ -44,7 +44,7 @@ class SteppedFit:
 
     fit: SeriesFit
     noise: SeriesNoise
-    steps: tuple[Step, ...]
+    steps: tuple[SeriesStep, ...]
     scan: StepScan
 
     def level(self, days: int) -> Array:
@@ -216,7 +216,7 @@ def _alone(
 
 def _steps(
     group: SeriesGroup, functions: Array, times: list[tuple[int, ...]], noise: SeriesNoise, probability: float
-) -> tuple[Step, ...]:
+) -> tuple[SeriesStep, ...]:
     """Sizes of the accepted steps, fitted together."""
     k, d = functions.shape[1], group.values.shape[2]
     steps = []
@@ -228,7 +228,7 @@ def _steps(
         for column, at in enumerate(own):
             block = slice((k + column) * d, (k + column + 1) * d)
             steps.append(
-                Step(
+                SeriesStep(
                     series=i,
                     at=at,
                     size=fit.coefficients[0, k + column],

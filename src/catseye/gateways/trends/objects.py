@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.writers.passage import Passage
-from catseye.reduction.trends.alarms import AlarmKind, Quantity, Severity, TrendAlarm
+from catseye.reduction.trends.alarms import AlarmKind, Severity, TrendAlarm, TrendQuantity
 from catseye.reduction.trends.bodies import BodyTrend, MotionTrend
 from catseye.reduction.trends.functions import TrendFunctions
 from catseye.reduction.trends.trends import TrendFindings
@@ -15,11 +15,11 @@ from catseye.reduction.trends.trends import TrendFindings
 FORMAT = "catseye-trends-1"
 MOST_SENTENCES = 12  # alarms in a terminal; the report and the table have all
 EPOCH = datetime(1858, 11, 17, tzinfo=UTC)
-LENGTHS = (Quantity.POINT, Quantity.BODY, Quantity.ZERO)
-DEGREES = (Quantity.THERMOMETER, Quantity.STATION, Quantity.SCALE)
+LENGTHS = (TrendQuantity.POINT, TrendQuantity.BODY, TrendQuantity.ZERO)
+DEGREES = (TrendQuantity.THERMOMETER, TrendQuantity.STATION, TrendQuantity.SCALE)
 
 
-def unit_of(quantity: Quantity) -> tuple[float, str]:
+def unit_of(quantity: TrendQuantity) -> tuple[float, str]:
     """Unit in which a quantity is printed: its size in SI and its name."""
     if quantity in LENGTHS:
         return MILLIMETRE, "mm"

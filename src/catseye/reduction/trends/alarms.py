@@ -29,7 +29,7 @@ class Severity(Enum):
 
 
 class AlarmKind(Enum):
-    """Kind of an alarm."""
+    """Kind of an alarm, as reports print it."""
 
     STEP = "step"
     DRIFT = "drift"
@@ -43,8 +43,8 @@ class AlarmKind(Enum):
     FAILED = "nights failed"
 
 
-class Quantity(Enum):
-    """Quantity of a series."""
+class TrendQuantity(Enum):
+    """TrendQuantity of a series."""
 
     POINT = "point"
     BODY = "body"
@@ -75,7 +75,7 @@ class TrendAlarm:
 
     severity: Severity
     kind: AlarmKind
-    quantity: Quantity
+    quantity: TrendQuantity
     subject: str
     mjd: float = float("nan")
     value: float = float("nan")
@@ -97,19 +97,36 @@ def body_alarms(body: BodyTrend, series: int, limit: float) -> list[TrendAlarm]:
     night = np.sqrt(np.mean(body.night_u**2, axis=1))
     for step in body.own.steps:
         alarms.append(
-            _step(Quantity.POINT, body.points.names[step.series], body.points.mjd[step.at], step.size, step.covariance,
-                  night[step.series], min(1.0, step.probability * series), part=body.name)
-        )  # fmt: skip
+            _step(
+                TrendQuantity.POINT,
+                body.points.names[step.series],
+                body.points.mjd[step.at],
+                step.size,
+                step.covariance,
+                night[step.series],
+                min(1.0, step.probability * series),
+                part=body.name,
+            )
+        )
     rate, covariance, probability = drift_probability(body.own.fit, body.functions)
     for i in np.flatnonzero(probability < limit):
         alarms.append(
-            _drift(Quantity.POINT, body.points.names[i], rate[i], covariance[i], night[i], span,
-                   min(1.0, float(probability[i]) * series), part=body.name)
-        )  # fmt: skip
+            _drift(
+                TrendQuantity.POINT,
+                body.points.names[i],
+                rate[i],
+                covariance[i],
+                night[i],
+                span,
+                min(1.0, float(probability[i]) * series),
+                part=body.name,
+            )
+        )
     if body.motion is not None:
         length = float(np.sqrt(np.mean(np.sum((body.place - body.middle) ** 2, axis=1))))
         alarms += motion_alarms(body.name, body.motion, body.points.mjd, body.functions, length, series, limit)
-    alarms += _outliers(body.outlier, measured(body.displacement), body.points.names, Quantity.POINT, body.name)
+    present = measured(body.displacement)
+    alarms += _outliers(body.outlier, present, body.points.names, TrendQuantity.POINT, body.name)
     claimed = float(np.sqrt(np.nanmedian(np.einsum("tnii->tn", body.spread)) / 3.0)) if len(body.spread) else 0.0
     total = float(np.hypot(claimed, np.hypot(body.own.noise.white[0], body.own.noise.wander[0])))
     if total > SCATTER * claimed > 0.0:
@@ -117,7 +134,7 @@ def body_alarms(body: BodyTrend, series: int, limit: float) -> list[TrendAlarm]:
             TrendAlarm(
                 severity=Severity.WARNING,
                 kind=AlarmKind.SCATTER,
-                quantity=Quantity.POINT,
+                quantity=TrendQuantity.POINT,
                 subject=body.name,
                 value=total,
                 limit=claimed,
@@ -145,31 +162,47 @@ def motion_alarms(
     for step in motion.found.steps:
         covariance = step.covariance * np.outer(lever, lever)
         chance = min(1.0, step.probability * series)
-        alarms.append(_step(Quantity.BODY, name, mjd[step.at], step.size * lever, covariance, night, chance))
+        alarms.append(_step(TrendQuantity.BODY, name, mjd[step.at], step.size * lever, covariance, night, chance))
     rate, covariance, probability = drift_probability(motion.found.fit, functions)
     if probability[0] < limit:
         chance, spread = min(1.0, float(probability[0]) * series), covariance[0] * np.outer(lever, lever)
         span = float(np.ptp(mjd)) / DAYS_PER_YEAR
-        alarms.append(_drift(Quantity.BODY, name, rate[0] * lever, spread, night, span, chance))
+        alarms.append(_drift(TrendQuantity.BODY, name, rate[0] * lever, spread, night, span, chance))
     return alarms
 
 
-def instrument_alarms(trend: InstrumentTrend, quantity: Quantity, series: int, limit: float) -> list[TrendAlarm]:
+def instrument_alarms(trend: InstrumentTrend, quantity: TrendQuantity, series: int, limit: float) -> list[TrendAlarm]:
     """Alarms of zeros, thermometers or a scale; arguments as for `body_alarms`."""
     alarms, span = [], float(np.ptp(trend.mjd)) / DAYS_PER_YEAR
     night = trend.night_u
-    part = trend.parameter if quantity in (Quantity.ZERO, Quantity.PARAMETER) else ""
+    part = trend.parameter if quantity in (TrendQuantity.ZERO, TrendQuantity.PARAMETER) else ""
     for step in trend.found.steps:
         alarms.append(
-            _step(quantity, trend.subjects[step.series], trend.mjd[step.at], step.size, step.covariance,
-                  float(night[step.series]), min(1.0, step.probability * series), part=part)
-        )  # fmt: skip
+            _step(
+                quantity,
+                trend.subjects[step.series],
+                trend.mjd[step.at],
+                step.size,
+                step.covariance,
+                float(night[step.series]),
+                min(1.0, step.probability * series),
+                part=part,
+            )
+        )
     rate, covariance, probability = drift_probability(trend.found.fit, trend.functions)
     for i in np.flatnonzero(probability < limit):
         alarms.append(
-            _drift(quantity, trend.subjects[i], rate[i], covariance[i], float(night[i]), span,
-                   min(1.0, float(probability[i]) * series), part=part)
-        )  # fmt: skip
+            _drift(
+                quantity,
+                trend.subjects[i],
+                rate[i],
+                covariance[i],
+                float(night[i]),
+                span,
+                min(1.0, float(probability[i]) * series),
+                part=part,
+            )
+        )
     return alarms + _outliers(trend.outlier, np.isfinite(trend.values), trend.subjects, quantity, part)
 
 
@@ -180,7 +213,7 @@ def calibration_alarms(trend: InstrumentTrend, certificates: dict[str, np.ndarra
     certificates   rows of the archive
     limit          probability below which a drift counts
     """
-    quantity = Quantity.ZERO if trend.parameter == "zero" else Quantity.PARAMETER
+    quantity = TrendQuantity.ZERO if trend.parameter == "zero" else TrendQuantity.PARAMETER
     rate, covariance, probability = drift_probability(trend.found.fit, trend.functions)
     alarms, last = [], float(trend.mjd[-1])
     for i, subject in enumerate(trend.subjects):
@@ -230,7 +263,7 @@ def certificate_alarms(certificates: dict[str, np.ndarray], nights: ArchivedNigh
                 TrendAlarm(
                     severity=Severity.ALARM if ended else Severity.WARNING,
                     kind=AlarmKind.EXPIRED if ended else AlarmKind.EXPIRES,
-                    quantity=Quantity.CERTIFICATE,
+                    quantity=TrendQuantity.CERTIFICATE,
                     subject=str(instrument),
                     mjd=end,
                     count=after,
@@ -250,7 +283,7 @@ def night_alarms(nights: ArchivedNights) -> list[TrendAlarm]:
             TrendAlarm(
                 severity=Severity.NOTE,
                 kind=AlarmKind.GAP,
-                quantity=Quantity.NIGHTS,
+                quantity=TrendQuantity.NIGHTS,
                 subject=str(nights.night[i]),
                 mjd=float(nights.mjd[i]),
                 value=float(steps[i]),
@@ -263,7 +296,7 @@ def night_alarms(nights: ArchivedNights) -> list[TrendAlarm]:
             TrendAlarm(
                 severity=Severity.WARNING,
                 kind=AlarmKind.FAILED,
-                quantity=Quantity.NIGHTS,
+                quantity=TrendQuantity.NIGHTS,
                 subject=str(nights.night[failed[-1]]),
                 mjd=float(nights.mjd[failed[-1]]),
                 count=len(failed),
@@ -300,9 +333,16 @@ def _size(values: Array, covariance: Array) -> tuple[float, float]:
 
 
 def _step(
-    quantity: Quantity, subject: str, mjd: float, size: Array, covariance: Array, night: float, probability: float, *,
+    quantity: TrendQuantity,
+    subject: str,
+    mjd: float,
+    size: Array,
+    covariance: Array,
+    night: float,
+    probability: float,
+    *,
     part: str = "",
-) -> TrendAlarm:  # fmt: skip
+) -> TrendAlarm:
     value, u = _size(size, covariance)
     return TrendAlarm(
         severity=Severity.ALARM if abs(value) >= night else Severity.WARNING,
@@ -319,9 +359,16 @@ def _step(
 
 
 def _drift(
-    quantity: Quantity, subject: str, rate: Array, covariance: Array, night: float, span: float, probability: float, *,
+    quantity: TrendQuantity,
+    subject: str,
+    rate: Array,
+    covariance: Array,
+    night: float,
+    span: float,
+    probability: float,
+    *,
     part: str = "",
-) -> TrendAlarm:  # fmt: skip
+) -> TrendAlarm:
     value, u = _size(rate, covariance)
     return TrendAlarm(
         severity=Severity.ALARM if abs(value) * max(span, 1.0) >= night else Severity.WARNING,
@@ -337,7 +384,7 @@ def _drift(
 
 
 def _outliers(
-    outlier: np.ndarray, present: np.ndarray, subjects: tuple[str, ...], quantity: Quantity, part: str
+    outlier: np.ndarray, present: np.ndarray, subjects: tuple[str, ...], quantity: TrendQuantity, part: str
 ) -> list[TrendAlarm]:
     """A warning for each series with many outliers, a note for all others together."""
     count, readings = outlier.sum(axis=0), np.maximum(present.sum(axis=0), 1)

@@ -239,10 +239,10 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
     known = np.zeros_like(y)
     outlier = np.zeros(y.shape[:2], bool)
     own, motion, found = None, None, None
+    noise: SeriesNoise | None = None
     for _ in range(PASSES if moving and len(arms) < FEW_POINTS else 1):
-        noise = None if own is None else own.noise
         own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving, noise)
-        fresh = own.steps
+        fresh, noise = own.steps, own.noise
         if not fresh or not moving or len(arms) >= FEW_POINTS:
             break
         largest = max(float(np.linalg.norm(step.size)) for step in fresh)
@@ -250,7 +250,7 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
             if np.linalg.norm(step.size) >= LARGEST_SHARE * largest:
                 known[step.at :, step.series] += step.size
     else:
-        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving, own.noise)
+        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving, noise)
     assert own is not None
     group = _group(points.mjd, motion, y - known, covariance, outlier)
     if known.any():  # the known steps are fitted again, with all else

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from catseye.aliases import Array
-from catseye.reduction.trends.alarms import AlarmKind, Quantity, TrendAlarm
+from catseye.reduction.trends.alarms import AlarmKind, TrendAlarm, TrendQuantity
 from catseye.reduction.trends.bodies import BodyTrend
 from catseye.reduction.trends.functions import YEAR, TrendFunctions
 from catseye.reduction.trends.instruments import InstrumentTrend
@@ -29,7 +29,7 @@ class DrawnSeries:
     prior, u_prior   of the newest calibration; NaN without
     """
 
-    quantity: Quantity
+    quantity: TrendQuantity
     subject: str
     part: str
     mjd: Array
@@ -44,12 +44,12 @@ class DrawnSeries:
 
 def drawn_series(findings: TrendFindings, alarms: tuple[TrendAlarm, ...]) -> list[DrawnSeries]:
     """Series of points and instruments with a change, each once, in the alarms' order."""
-    found: dict[tuple[Quantity, str, str], DrawnSeries] = {}
+    found: dict[tuple[TrendQuantity, str, str], DrawnSeries] = {}
     for alarm in alarms:
         key = (alarm.quantity, alarm.subject, alarm.part)
         if alarm.kind not in CHANGES or key in found:
             continue
-        if alarm.quantity is Quantity.POINT:
+        if alarm.quantity is TrendQuantity.POINT:
             for body in findings.bodies:
                 if body.name == alarm.part and alarm.subject in body.points.names:
                     found[key] = point_series(body, body.points.names.index(alarm.subject))
@@ -78,7 +78,7 @@ def point_series(body: BodyTrend, point: int) -> DrawnSeries:
         model[step.at :] += float(step.size @ along)
     value, model = _lasting(value, model, rows, coefficients @ along, body.functions)
     return DrawnSeries(
-        quantity=Quantity.POINT,
+        quantity=TrendQuantity.POINT,
         subject=body.points.names[point],
         part=body.name,
         mjd=body.points.mjd,
@@ -90,7 +90,7 @@ def point_series(body: BodyTrend, point: int) -> DrawnSeries:
     )
 
 
-def instrument_series(quantity: Quantity, trend: InstrumentTrend, series: int) -> DrawnSeries:
+def instrument_series(quantity: TrendQuantity, trend: InstrumentTrend, series: int) -> DrawnSeries:
     """Values of an instrument at the mean temperature."""
     return DrawnSeries(
         quantity=quantity,

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -341,7 +340,7 @@ def read_certificates(archive: ArchiveFolder, nights: ArchivedNights) -> dict[st
 
 def _of_nights(
     archive: ArchiveFolder, kind: str, columns: tuple[str, ...] | None, nights: ArchivedNights
-) -> dict[str, Any]:
+) -> dict[str, np.ndarray]:
     """Columns of a table for the nights, by time: a day around them, then by night where the table says it."""
     first, last = float(nights.mjd[0]) - 1.0, float(nights.mjd[-1]) + 1.0
     names = None if columns is None else tuple(dict.fromkeys((*columns, "night")))

@@ -11,9 +11,9 @@ from catseye.errors import ArgumentError, EstimationError, InputError
 from catseye.records.archive.reading import ArchiveFolder
 from catseye.reduction.structure.group import Nominal
 from catseye.reduction.trends.alarms import (
-    Quantity,
     Severity,
     TrendAlarm,
+    TrendQuantity,
     body_alarms,
     calibration_alarms,
     certificate_alarms,
@@ -84,7 +84,7 @@ class TrendFindings:
     nights: ArchivedNights
     bodies: tuple[BodyTrend, ...]
     poses: tuple[PoseTrend, ...]
-    instruments: tuple[tuple[Quantity, InstrumentTrend], ...]
+    instruments: tuple[tuple[TrendQuantity, InstrumentTrend], ...]
     alarms: tuple[TrendAlarm, ...]
     false_alarm: float
     series: int
@@ -169,7 +169,7 @@ def find_trends(
     certificates = read_certificates(archive, nights)
     for quantity, trend in instruments:
         alarms += instrument_alarms(trend, quantity, series, limit)
-        if quantity in (Quantity.ZERO, Quantity.PARAMETER):
+        if quantity in (TrendQuantity.ZERO, TrendQuantity.PARAMETER):
             alarms += calibration_alarms(trend, certificates, limit)
     alarms += certificate_alarms(certificates, nights)
     if not len(certificates["mjd"]):
@@ -261,20 +261,20 @@ def _instruments(
     scales: list[SingleSeries],
     settings: TrendSettings,
     notes: list[str],
-) -> list[tuple[Quantity, InstrumentTrend]]:
+) -> list[tuple[TrendQuantity, InstrumentTrend]]:
     """Models of zeros, thermometers and scales."""
-    groups: list[tuple[Quantity, list[SingleSeries]]] = []
+    groups: list[tuple[TrendQuantity, list[SingleSeries]]] = []
     for parameter in sorted({one.parameter for one in zeros}, key=lambda p: (p != "zero", p)):
-        quantity = Quantity.ZERO if parameter == "zero" else Quantity.PARAMETER
+        quantity = TrendQuantity.ZERO if parameter == "zero" else TrendQuantity.PARAMETER
         groups.append((quantity, [one for one in zeros if one.parameter == parameter]))
-    groups += [(Quantity.THERMOMETER, list(readings.by_ranges)), (Quantity.SCALE, scales)]
+    groups += [(TrendQuantity.THERMOMETER, list(readings.by_ranges)), (TrendQuantity.SCALE, scales)]
     if not zeros:
         notes.append("No night estimates a ranger's zero: zeros were not looked at.")
     found = [(quantity, trend) for quantity, one in groups if (trend := fit_instruments(one, settings)) is not None]
     if not readings.by_ranges:
         notes.append("No night estimates an error of a thermometer: thermometers were compared with each other alone.")
         beside = _beside_others(readings, nights, settings)
-        found += [] if beside is None else [(Quantity.STATION, beside)]
+        found += [] if beside is None else [(TrendQuantity.STATION, beside)]
     return found
 
 
