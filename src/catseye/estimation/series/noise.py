@@ -12,8 +12,9 @@ MOST_READINGS = 6_000  # whose likelihoods are added up: more change a common st
 BLOCKS = (2, 4, 8, 16, 32, 64)  # readings of a mean: its variance shows noise that lasts
 SURE = 1.5  # standard deviations of that variance
 LEAST_DEGREES = 8  # readings less coefficients: fewer tell no noise
-LEAST_GAIN = 1.0  # of the log likelihood, by two parameters of a wander
+LEAST_GAIN = 2.0  # of the log likelihood, by two parameters of a wander: the criterion of Akaike
 PLENTY = 5000  # readings: of fewer, means of some tell too little whether noise lasts
+SHORTEST = 2.0  # usual distances of two readings: a noise that lasts for less is as good as new in each
 WORTH = 0.05  # of the readings' scatter: a smaller noise is none
 WINDOW = 9  # readings of a running median
 MAD = 1.4826  # from a median absolute deviation to a standard deviation of the normal distribution
@@ -63,7 +64,7 @@ def noise_of(group: SeriesGroup, functions: Array) -> SeriesNoise:
         return SeriesNoise.of(d, white if white > WORTH * scatter else 0.0)
 
     def full_cost(x: Array) -> float:
-        if not (np.log(0.5 * step) <= x[2] <= np.log(span) and max(x[:2]) < 3.0):
+        if not (np.log(SHORTEST * step) <= x[2] <= np.log(span) and max(x[:2]) < 3.0):
             return np.inf
         return cost(scatter * float(np.exp(x[0])), scatter * float(np.exp(x[1])), float(np.exp(x[2])))
 

@@ -75,8 +75,8 @@ def fit_with_steps(
     likeliest step of each series, and the better end by an information criterion is taken.
 
     >>> days = np.arange(60.0)
-    >>> values = np.where(days < 30, 0.0, 1.0)[:, None, None] + 0.1 * np.sin(7.0 * days**2)[:, None, None]
-    >>> group = SeriesGroup(days, values, np.full((60, 1, 1, 1), 0.01))
+    >>> values = np.where(days < 30, 0.0, 1.0)[:, None, None] + 0.01 * np.sin(7.0 * days**2)[:, None, None]
+    >>> group = SeriesGroup(days, values, np.full((60, 1, 1, 1), 1e-4))
     >>> found = fit_with_steps(group, np.ones((60, 1)), probability=1e-3)
     >>> [(step.at, round(float(step.size[0]), 1)) for step in found.steps]
     [(30, 1.0)]
