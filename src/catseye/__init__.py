@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from catseye.api.scale.many import reduce_nights
     from catseye.api.scale.many_runs import replay_journals, simulate_runs
     from catseye.api.scale.query import query
+    from catseye.api.scale.trends import trends
     from catseye.api.steering import point, track
     from catseye.api.structure import structure
     from catseye.api.surface import surface
@@ -83,6 +84,7 @@ FACE = {  # file of catseye.api -> its exported names
     "scale.many": ("reduce_nights",),
     "scale.many_runs": ("replay_journals", "simulate_runs"),
     "scale.query": ("query",),
+    "scale.trends": ("trends",),
     "steering": ("point", "track"),
     "structure": ("structure",),
     "surface": ("surface",),
@@ -151,6 +153,7 @@ __all__ = [
     "surface",
     "track",
     "track_pointing",
+    "trends",
     "triplet",
 ]
 

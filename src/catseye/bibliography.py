@@ -347,6 +347,26 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1093/biomet/58.3.545",
         used="restricted maximum likelihood and its information",
     ),
+    "WORSLEY82": Source(
+        title="K. J. Worsley, An improved Bonferroni inequality and applications, 1982",
+        locator="doi:10.1093/biomet/69.2.297",
+        used="upper bound of the probability of a union by pairs along a tree (`estimation.series.change`)",
+    ),
+    "WORSLEY83": Source(
+        title="K. J. Worsley, Testing for a two-phase multiple regression, 1983",
+        locator="doi:10.1080/00401706.1983.10487817",
+        used="largest F statistic over the times of a change (`estimation.series.change`)",
+    ),
+    "SCHWARZ78": Source(
+        title="G. Schwarz, Estimating the dimension of a model, 1978",
+        locator="doi:10.1214/aos/1176344136",
+        used="information criterion of two models (`estimation.series.steps`)",
+    ),
+    "HARVEY89": Source(
+        title="A. C. Harvey, Forecasting, Structural Time Series Models and the Kalman Filter, Cambridge, 1989",
+        locator="doi:10.1017/CBO9781107049994",
+        used="chapter 3: likelihood and regression by the innovations of a filter (`estimation.series.correlated`)",
+    ),
     "JCGM102": Source(
         title="JCGM, Extension of the guide to any number of output quantities, 2011",
         locator="JCGM 102:2011",

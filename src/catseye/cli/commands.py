@@ -24,7 +24,7 @@ ROOMS = (
     *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
-    *("scale.archive", "scale.query", "scale.design"),
+    *("scale.archive", "scale.design", "scale.query", "scale.trends"),
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples"),
@@ -35,7 +35,7 @@ SUBJECTS = {  # as `catseye --help` groups the commands
     "Air": ("air", "sound", "refractometer", "acoustic"),
     "Light": ("point", "link", "beam", "glass", "safety"),
     "A living site": ("simulate", "serve", "view", "zy", "ziy", "replay", "export", "journal"),
-    "Years of nights": ("archive", "restore", "query"),
+    "Years of nights": ("archive", "restore", "query", "trends"),
     "Figures": ("plot",),
 }
 

@@ -1,0 +1,1 @@
+"""Output of an archive's trends."""

@@ -1,0 +1,1 @@
+"""Trends over an archive: bodies, rangers, thermometers, calibrations, and alarms."""
