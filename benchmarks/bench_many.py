@@ -176,8 +176,9 @@ def compared(nights: Sequence[Path], place: Path, what: str) -> None:
         answers[name] = tuple(outcome.value and outcome.value["digest"] for outcome in many.outcomes)
         failed = len(many.failures)
         sizes = f"{memory.together / GIB:.2f} GiB together, {memory.one / GIB:.2f} GiB of one"
+        used_by = f"{cpu:.1f} s" if cpu else "uncounted s"
         say(
-            f"    {name:<22} {wall:8.1f} s, {first / wall:.2f} times one worker; {f'{cpu:.1f} s' if cpu else 'uncounted s'} of processors; {sizes}"
+            f"    {name:<22} {wall:8.1f} s, {first / wall:.2f} times one worker; {used_by} of processors; {sizes}"
             + (f"; {failed} FAILED: {many.failures[0].why}" if failed else "")
         )
         rmtree(place / "out")

@@ -162,7 +162,15 @@ COMMANDS = {  # directory -> the command that writes it; night: of the one befor
     "change": ["surface", "night", "night"],
 }  # fmt: skip
 WITHOUT_TABLES = {"certificate", "plot"}  # commands with --out that write a page or a figure
-ELSEWHERE = {"demo", "export", "query", "structure"}  # `demo` is `reduce`; others: see tests/gateways
+ELSEWHERE = {
+    "demo",
+    "export",
+    "query",
+    "replay",
+    "simulate",
+    "structure",
+    "trends",
+}  # `demo` is `reduce`; others: see tests/gateways
 
 
 @pytest.mark.slow

@@ -176,7 +176,7 @@ def archive(
 
     listed = [sources] if isinstance(sources, str | os.PathLike) else list(sources)
     where, change = Path(directory), NO_CHANGE
-    places = [each if "://" in each else str(place_of(each)) for each in map(str, listed)]
+    places = [item if "://" in item else str(place_of(item)) for item in map(str, listed)]
     if isinstance(remove, str):
         raise ArgumentError(f"remove = {remove!r} (expected a list of identifiers)", "remove")
     if places or compact or remove:
@@ -277,7 +277,7 @@ def _verdict(outcomes: "Sequence[UnitOutcome]", damage: Sequence[str], nights: i
         return Verdict("failed", f"{len(failed)} of {len(outcomes)} sources failed: {failed[0].name}: {failed[0].why}")
     if not nights:
         return Verdict("doubtful", "there is no night in it")
-    empty = [each for each in outcomes if ((each.value or {}).get("result") or {}).get("word") == "failed"]
+    empty = [item for item in outcomes if ((item.value or {}).get("result") or {}).get("word") == "failed"]
     if empty:
         why = (empty[0].value or {})["result"]["why"]
         return Verdict("doubtful", f"{empty[0].name} was archived with a failed result: {why}")

@@ -67,7 +67,7 @@ class ManyResult(Result):
         values = [outcome.value or {} for outcome in self.outcomes]
         for name in dict.fromkeys(name for value in values for name in value):
             column = [value.get(name) for value in values]
-            if name not in columns and all(each is None or isinstance(each, str | int | float) for each in column):
+            if name not in columns and all(entry is None or isinstance(entry, str | int | float) for entry in column):
                 columns[name] = (_column(column), "")
         return {f"{self.noun}s": quantities(columns)}
 

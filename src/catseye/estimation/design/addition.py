@@ -61,9 +61,9 @@ def with_ranger(
     others = np.zeros((len(network.rangers) + 1, count))
     others[-1] = distance
     product, lower = prediction.across(columns, others)
-    seen = np.einsum("mk,mkc->mc", unit, product[targets]) + distance[:, None] * lower[-1]
-    own = unit * np.asarray(u)
-    total = seen + own @ own.T + max(u_zero, LEAST_U_ZERO) ** 2 + np.diag(network.claim.variance(distance))
+    predicted = np.einsum("mk,mkc->mc", unit, product[targets]) + distance[:, None] * lower[-1]
+    along_u = unit * np.asarray(u)
+    total = predicted + along_u @ along_u.T + max(u_zero, LEAST_U_ZERO) ** 2 + np.diag(network.claim.variance(distance))
     inverse = np.linalg.inv(0.5 * (total + total.T))
     covariance = prediction.covariance - (product @ inverse) @ np.swapaxes(product, 1, 2)
     return AddedRanger(

@@ -71,16 +71,16 @@ class WorstAxis:
 
         Source: d tr(Q^p) = p tr(Q^(p-1) dQ).
         """
-        own = prediction.covariance[self.points]
-        largest = np.max(np.trace(own, axis1=1, axis2=2).real)
-        scaled, power = own / largest, 2**self.squarings
-        high = np.broadcast_to(np.eye(3), own.shape)  # power - 1 = 1 + 2 + 4 + ...
+        blocks_of_points = prediction.covariance[self.points]
+        largest = np.max(np.trace(blocks_of_points, axis1=1, axis2=2).real)
+        scaled, power = blocks_of_points / largest, 2**self.squarings
+        high = np.broadcast_to(np.eye(3), blocks_of_points.shape)  # power - 1 = 1 + 2 + 4 + ...
         factor = scaled
         for _ in range(self.squarings):
             high, factor = high @ factor, factor @ factor
         total = np.trace(factor, axis1=1, axis2=2).sum()
         value = total ** (1.0 / power)
-        blocks = np.zeros(prediction.covariance.shape, dtype=own.dtype)
+        blocks = np.zeros(prediction.covariance.shape, dtype=blocks_of_points.dtype)
         blocks[self.points] = high * (value / total)
         return Sensitivity(value * largest, blocks)
 
@@ -117,8 +117,8 @@ class BodyPose:
         x = prediction.network.points[self.points]
         motions, estimator = self._parts(x)
         size = 3 * len(x)
-        left = np.linalg.cholesky((motions.T @ motions).real)  # any basis of the motions gives the same projector
-        basis = np.linalg.solve(left, motions.T).T
+        remainder = np.linalg.cholesky((motions.T @ motions).real)  # any basis of the motions gives the same projector
+        basis = np.linalg.solve(remainder, motions.T).T
         gram = np.linalg.inv(basis.T @ basis)  # the identity, but for a complex step
         columns, weights = self._on_points(prediction, basis), np.full(6, 1.0 / size)
         across = prediction.across(columns)[0][self.points].reshape(size, 6)
@@ -206,8 +206,8 @@ class SurfaceVariance:
         """Mean square (runs,) m^2 of half-path errors less the fit, of errors (runs, n, 3)."""
         root = np.sqrt(self.weights)
         half_path = np.einsum("rki,ki->rk", errors[:, self.points], self.along) * root
-        left = half_path - (half_path @ self._basis) @ self._basis.T
-        return np.asarray(np.sum(left**2, axis=1))
+        remainder = half_path - (half_path @ self._basis) @ self._basis.T
+        return np.asarray(np.sum(remainder**2, axis=1))
 
     @cached_property
     def _basis(self) -> Array:

@@ -59,7 +59,7 @@ def _adjoint_rows(prediction: DesignPrediction, sensitivity: Sensitivity) -> tup
     network, sights = prediction.network, prediction.sights
     unit, d = sights.unit, sights.distance
     ranger, target = network.pairs.T
-    border, lower, own = _adjoint(prediction, sensitivity.blocks)
+    border, lower, diagonal_blocks = _adjoint(prediction, sensitivity.blocks)
     count, three = len(network.rangers), np.arange(3)
     zero, scale = 3 * count + ranger, 4 * count
     here = 3 * ranger[:, None] + three
@@ -78,7 +78,7 @@ def _adjoint_rows(prediction: DesignPrediction, sensitivity: Sensitivity) -> tup
     at_zero, at_scale = to_target(zero), to_target(np.full(len(ranger), scale))
     at_here = np.stack([to_target(here[:, k]) for k in range(3)], axis=2)  # (m, 3 target, 3 ranger)
     itself = np.where(
-        other[:, None, None], border[place[:, :, None], place[:, None, :]], own[np.where(other, 0, target)]
+        other[:, None, None], border[place[:, :, None], place[:, None, :]], diagonal_blocks[np.where(other, 0, target)]
     )
     mine = border[here[:, :, None], here[:, None, :]]
     zero_here, scale_here = border[here, zero[:, None]], border[here, scale]
@@ -113,7 +113,7 @@ def _adjoint(prediction: DesignPrediction, blocks: Array) -> tuple[Array, Array,
     adjoint = border @ middle @ border
     raised = adjoint @ gain
     lower = -raised.T
-    own = np.empty(blocks.shape, dtype=adjoint.dtype)
+    diagonal_blocks = np.empty(blocks.shape, dtype=adjoint.dtype)
     low = 0
     for (rows, _), inverse in zip(network.batches, prediction.inverse, strict=True):
         number, width = inverse.shape[:2]
@@ -129,10 +129,10 @@ def _adjoint(prediction: DesignPrediction, blocks: Array) -> tuple[Array, Array,
         block = near @ raised[:, part].reshape(size, number, width).transpose(1, 0, 2)
         block = block + turned @ inverse + mixed + np.swapaxes(mixed, 1, 2)
         for k in range(rows.shape[1]):
-            own[rows[:, k]] = block[:, 3 * k : 3 * k + 3, 3 * k : 3 * k + 3]
+            diagonal_blocks[rows[:, k]] = block[:, 3 * k : 3 * k + 3, 3 * k : 3 * k + 3]
         low += number * width
-    own[network.rangers] = adjoint[first + three[:, None], first + three]
-    return adjoint, lower, own
+    diagonal_blocks[network.rangers] = adjoint[first + three[:, None], first + three]
+    return adjoint, lower, diagonal_blocks
 
 
 def _times(matrices: Array, vectors: Array) -> Array:

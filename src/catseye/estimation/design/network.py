@@ -224,14 +224,14 @@ def _normal_equations(network: DesignNetwork, sights: Sights) -> tuple[Array, Ar
     w, d = sights.weight, sights.distance
     wu = sights.unit * w[:, None]
     dyad = wu[:, :, None] * sights.unit[:, None, :]
-    own = network.information.astype(kind)
-    np.add.at(own, at, dyad)
-    np.add.at(own, target, dyad)
+    information_of = network.information.astype(kind)
+    np.add.at(information_of, at, dyad)
+    np.add.at(information_of, target, dyad)
     three = np.arange(3)
     zero, scale = 3 * count + np.arange(count), 4 * count
     matrix = np.zeros((4 * count + 1, 4 * count + 1), dtype=kind)
     first = 3 * np.arange(count)
-    matrix[first[:, None, None] + three[:, None], first[:, None, None] + three] = own[network.rangers]
+    matrix[first[:, None, None] + three[:, None], first[:, None, None] + three] = information_of[network.rangers]
     to_zero, to_scale = np.zeros((count, 3), dtype=kind), np.zeros((count, 3), dtype=kind)
     np.add.at(to_zero, ranger, -wu)
     np.add.at(to_scale, ranger, -wu * d[:, None])
@@ -256,7 +256,7 @@ def _normal_equations(network: DesignNetwork, sights: Sights) -> tuple[Array, Ar
     between[first[i][:, None, None] + three[:, None], column[:, None, :]] = -dyad[apart]  # each pair is there once
     between[zero[i][:, None], column] = wu[apart]
     np.add.at(between, (scale, column), wu[apart] * d[apart, None])
-    return matrix, between, own
+    return matrix, between, information_of
 
 
 def _covariances(network: DesignNetwork, border: Array, gain: Array, carried: Array, inverses: list[Array]) -> Array:

@@ -115,28 +115,28 @@ class BatchedNetwork:
         """Solve one batch in place."""
         going, cost = np.arange(len(x)), np.full(len(x), np.inf)
         for step in range(STEPS):
-            slopes, misfit, now = self._linear([o[going] for o in observed], x[going])
-            fine = np.isfinite(now) & (now <= cost[going] * ROUNDING) & np.isfinite(slopes).all(axis=1)
-            going, slopes, misfit, now = going[fine], slopes[fine], misfit[fine], now[fine]
+            slopes, misfit, cost_now = self._linear([o[going] for o in observed], x[going])
+            fine = np.isfinite(cost_now) & (cost_now <= cost[going] * ROUNDING) & np.isfinite(slopes).all(axis=1)
+            going, slopes, misfit, cost_now = going[fine], slopes[fine], misfit[fine], cost_now[fine]
             if not len(going):
                 return
-            cost[going] = now
+            cost[going] = cost_now
             right = self._right(slopes, misfit, x[going])
             common = self._first_root if step < COMMON else None
             if common is not None:
-                whitened, held = right @ common.T, np.ones(len(going), dtype=bool)
+                whitened, regular = right @ common.T, np.ones(len(going), dtype=bool)
                 moved = whitened @ common
             else:
-                roots, held = self._roots(slopes)
+                roots, regular = self._roots(slopes)
                 whitened = np.matmul(roots, right[:, :, None])[:, :, 0]
                 moved = np.matmul(roots.transpose(0, 2, 1), whitened[:, :, None])[:, :, 0]
-            x[going[:, None], self.moving] += np.where(held[:, None], moved, 0.0)
-            done = held & (step > 0) & (np.linalg.norm(whitened, axis=1) < STEP_IN_SIGMAS)
+            x[going[:, None], self.moving] += np.where(regular[:, None], moved, 0.0)
+            done = regular & (step > 0) & (np.linalg.norm(whitened, axis=1) < STEP_IN_SIGMAS)
             if done.any():
                 roots, sound = self._roots(slopes[done])
                 variance[going[done]] = np.where(sound[:, None], self._variances(roots), np.nan)
                 accepted[going[done]] = sound
-            going = going[held & ~done]
+            going = going[regular & ~done]
             if not len(going):
                 return
 
@@ -180,8 +180,8 @@ class BatchedNetwork:
     @cached_property
     def _first_root(self) -> np.ndarray | None:
         """Inverse Cholesky factor (k, k) at the planned parameters; None where one is not well determined."""
-        roots, held = self._roots(self._linear([g.observed[None] for g in self.groups], self.x0[None])[0])
-        return roots[0] if held[0] else None
+        roots, regular = self._roots(self._linear([g.observed[None] for g in self.groups], self.x0[None])[0])
+        return roots[0] if regular[0] else None
 
     @cached_property
     def _datum_weight(self) -> float:
@@ -218,14 +218,14 @@ class BatchedNetwork:
         roots = self._lower(slopes)
         if len(self._conditions):
             roots += self._datum_weight * np.tril(self._conditions.T @ self._conditions)
-        held = np.zeros(len(roots), dtype=bool)
+        regular = np.zeros(len(roots), dtype=bool)
         for k, matrix in enumerate(roots):
             diagonal = np.diag(matrix).copy()
             factor, failed = lapack.dpotrf(matrix.T, lower=0, clean=0, overwrite_a=1)
-            held[k] = not failed and bool(np.all(np.diag(factor) ** 2 > DOUBTFUL * diagonal))
-            if held[k]:
+            regular[k] = not failed and bool(np.all(np.diag(factor) ** 2 > DOUBTFUL * diagonal))
+            if regular[k]:
                 matrix[:] = lapack.dtrtri(factor, lower=0, overwrite_c=1)[0].T
-        return roots, held
+        return roots, regular
 
     def _variances(self, roots: np.ndarray) -> np.ndarray:
         """Variances (r, k) of the parameters in the datum."""

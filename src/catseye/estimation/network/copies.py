@@ -83,16 +83,16 @@ def _fields(group: ObservationGroup, copies: int, size: int) -> dict[str, Any]:
     offset = size * np.arange(copies)
     result: dict[str, Any] = {"covariance": np.ones(m * copies)}  # of no concern to a prediction
     for name, array in arrays.items():
-        own = array
+        columns_of = array
         if name in columns and len(array) not in lengths:  # the same columns in every row
-            own = np.broadcast_to(array, (rows, array.shape[-1]))
-        if len(own) not in lengths and name not in columns:
+            columns_of = np.broadcast_to(array, (rows, array.shape[-1]))
+        if len(columns_of) not in lengths and name not in columns:
             continue
-        repeated = np.broadcast_to(own, (copies, *own.shape))
+        repeated = np.broadcast_to(columns_of, (copies, *columns_of.shape))
         if name in columns:
-            shift = offset.reshape(-1, *(1,) * own.ndim)
-            repeated = np.where(own < 0, own, own + shift)
-        result[name] = repeated.reshape(-1, *own.shape[1:])
+            shift = offset.reshape(-1, *(1,) * columns_of.ndim)
+            repeated = np.where(columns_of < 0, columns_of, columns_of + shift)
+        result[name] = repeated.reshape(-1, *columns_of.shape[1:])
     return result
 
 

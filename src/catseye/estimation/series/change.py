@@ -69,8 +69,8 @@ def scan_steps(
     wide = np.broadcast_to(wide, (t, s, k))
     size = max(1, CHUNK // max(1, t * d * (1 + k * d) * 4))
     parts = [np.arange(i, min(i + size, s)) for i in range(0, s, size)] or [np.arange(0)]
-    found = [_scanned(group.part(part), wide[:, part], noise, limit) for part in parts]
-    fits, scans = [pair[0] for pair in found], [pair[1] for pair in found]
+    forward = [_scanned(group.part(part), wide[:, part], noise, limit) for part in parts]
+    fits, scans = [pair[0] for pair in forward], [pair[1] for pair in forward]
     axes = {"residual": 1, "profile": 1}
 
     def joined(values: list[SeriesFit] | list[StepScan]) -> dict[str, Array]:
@@ -82,10 +82,10 @@ def scan_steps(
 
 def _scanned(group: SeriesGroup, functions: Array, noise: SeriesNoise, limit: float) -> tuple[SeriesFit, StepScan]:
     t, s, d = group.values.shape
-    found = filtered(group, functions, noise)
-    fit, inverse = solved(group, functions, found)
-    own, following = step_products(found)
-    columns = weighted_columns(found)
+    forward = filtered(group, functions, noise)
+    fit, inverse = solved(group, functions, forward)
+    own, following = step_products(forward)
+    columns = weighted_columns(forward)
     suffix = np.cumsum(columns[::-1], axis=0)[::-1]  # of each time and all later ones
     theta = np.nan_to_num(fit.coefficients).reshape(s, -1)
     gradient = suffix[..., 0] - np.einsum("tsdm,sm->tsd", suffix[..., 1:], theta)
@@ -163,8 +163,8 @@ def _correlations(information: Array, cross: Array, possible: np.ndarray, own: A
         if j != i + 1:
             values.append(0.0 if _changed(own, i, j) else 1.0)
             continue
-        left, right = np.linalg.cholesky(information[i]), np.linalg.cholesky(information[j])
-        inner = np.linalg.solve(left, cross[i])
+        remainder, right = np.linalg.cholesky(information[i]), np.linalg.cholesky(information[j])
+        inner = np.linalg.solve(remainder, cross[i])
         inner = np.linalg.solve(right, inner.T)
         values.append(float(np.linalg.svd(inner.reshape(d, d), compute_uv=False)[-1]))
     return np.array(values)
@@ -205,9 +205,9 @@ def largest_probability(single: float, d: int, correlations: Array) -> float:
     # The second is rho times the first along its direction, and noise: one component along, d - 1 across.
     across, share = roots_genlaguerre(ACROSS, 0.5 * (d - 3)) if d > 1 else (np.zeros(1), np.ones(1))
     share = share / share.sum()
-    left = limit - 2.0 * across * spread[:, None, None] ** 2
-    edge = np.sqrt(np.maximum(left, 0.0)) / spread[:, None, None]
+    remainder = limit - 2.0 * across * spread[:, None, None] ** 2
+    edge = np.sqrt(np.maximum(remainder, 0.0)) / spread[:, None, None]
     along = (rho[:, None] * first / spread[:, None])[..., None]
-    over = np.where(left > 0.0, ndtr(along - edge) + ndtr(-along - edge), 1.0) @ share
+    over = np.where(remainder > 0.0, ndtr(along - edge) + ndtr(-along - edge), 1.0) @ share
     joint = np.sum(density * over, axis=1)
     return float(min(1.0, single + np.minimum(joint, single).sum()))

@@ -155,16 +155,16 @@ def fit_series(group: SeriesGroup, functions: Array, noise: SeriesNoise) -> Seri
     return solved(group, _by_series(functions, group), filtered(group, _by_series(functions, group), noise))[0]
 
 
-def solved(group: SeriesGroup, functions: Array, found: Filtered) -> tuple[SeriesFit, Array]:
+def solved(group: SeriesGroup, functions: Array, forward: Filtered) -> tuple[SeriesFit, Array]:
     """Fit from innovations, with the inverse (S, k d, k d) normal matrix.
 
     functions   (T, S, k)
     """
     t, s, d = group.values.shape
     k = functions.shape[2]
-    weighted = found.inverse @ found.innovations  # (T, S, d, m)
-    m = found.innovations.shape[3]
-    flat = np.moveaxis(found.innovations, 1, 0).reshape(s, t * d, m)
+    weighted = forward.inverse @ forward.innovations  # (T, S, d, m)
+    m = forward.innovations.shape[3]
+    flat = np.moveaxis(forward.innovations, 1, 0).reshape(s, t * d, m)
     products = np.swapaxes(flat, 1, 2) @ np.moveaxis(weighted, 1, 0).reshape(s, t * d, m)
     normal, right = products[:, 1:, 1:], products[:, 1:, 0]
     inverse, determined, logarithm = _inverses(normal)
@@ -178,8 +178,8 @@ def solved(group: SeriesGroup, functions: Array, found: Filtered) -> tuple[Serie
         covariance=np.where(determined[:, :, None] & determined[:, None, :], inverse, np.nan),
         pvv=pvv,
         degrees_of_freedom=d * present.sum(axis=0) - count,
-        logarithm=-0.5 * (found.logarithm + logarithm + pvv),
-        likelihood=-0.5 * (found.logarithm + pvv),
+        logarithm=-0.5 * (forward.logarithm + logarithm + pvv),
+        likelihood=-0.5 * (forward.logarithm + pvv),
         residual=np.where(present[:, :, None], group.values - predicted, np.nan),
     )
     return fit, inverse
@@ -216,47 +216,47 @@ def filtered(group: SeriesGroup, functions: Array, noise: SeriesNoise) -> Filter
         gains[i] = wander @ inverses[i]
         columns[i] -= np.where(present[i][:, None, None], state, 0.0)
         state = decay[i][:, None] * (state + gains[i] @ columns[i])
-        both = decay[i][:, None] * decay[i]
-        wander = both * (wander - gains[i] @ wander) + variance * (1.0 - both)
+        pair = decay[i][:, None] * decay[i]
+        wander = pair * (wander - gains[i] @ wander) + variance * (1.0 - pair)
         wander = 0.5 * (wander + np.swapaxes(wander, 1, 2))
         total += np.where(present[i], logarithm, 0.0)
     return Filtered(innovations=columns, inverse=inverses, gain=gains, decay=decay, logarithm=total)
 
 
-def weighted_columns(found: Filtered) -> Array:
+def weighted_columns(forward: Filtered) -> Array:
     """Inverse covariance times readings and functions, (T, S, d, 1 + k d), by the filter's adjoint."""
-    weighted = found.inverse @ found.innovations
-    if found.gain is None:
+    weighted = forward.inverse @ forward.innovations
+    if forward.gain is None:
         return weighted
     size = weighted.shape[1:]
     costate = np.zeros(size)
     for i in range(len(weighted) - 1, -1, -1):
-        moved = found.decay[i][:, None] * costate
+        moved = forward.decay[i][:, None] * costate
         weighted[i], costate = (
-            weighted[i] + np.swapaxes(found.gain[i], 1, 2) @ moved,
-            moved - weighted[i] - np.swapaxes(found.gain[i], 1, 2) @ moved,
+            weighted[i] + np.swapaxes(forward.gain[i], 1, 2) @ moved,
+            moved - weighted[i] - np.swapaxes(forward.gain[i], 1, 2) @ moved,
         )
     return weighted
 
 
-def step_products(found: Filtered) -> tuple[Array, Array]:
+def step_products(forward: Filtered) -> tuple[Array, Array]:
     """Products h' C^-1 h of steps h at each time, and of each with the next one: (T, S, d, d) twice.
 
     A step is 1 from its time on, in one component each. The second is h_t' C^-1 h_(t+1); zero at the last time.
     """
-    t, s, d, _ = found.inverse.shape
+    t, s, d, _ = forward.inverse.shape
     own, following = np.zeros((t, s, d, d)), np.zeros((t, s, d, d))
     quadratic, linear, constant = np.zeros((s, d, d)), np.zeros((s, d, d)), np.zeros((s, d, d))
     for i in range(t - 1, -1, -1):
-        weight = found.inverse[i]
-        if found.gain is None:
+        weight = forward.inverse[i]
+        if forward.gain is None:
             following[i] = constant
             constant = constant + weight
             own[i] = constant
             continue
-        decay = found.decay[i][:, None]
-        by_input = decay * found.gain[i]
-        by_state = decay * (np.eye(d) - found.gain[i])
+        decay = forward.decay[i][:, None]
+        by_input = decay * forward.gain[i]
+        by_state = decay * (np.eye(d) - forward.gain[i])
         back = np.swapaxes(by_input, 1, 2)
         following[i] = constant + back @ linear
         crossed = quadratic @ by_input

@@ -117,10 +117,10 @@ def _lasts(residual: Array) -> bool:
         if count < 2:
             return False
         sums = unit[: count * size].reshape(count, size, -1).sum(axis=1)
-        each = known[: count * size].reshape(count, size, -1).sum(axis=1)
-        if not each.any():
+        binned = known[: count * size].reshape(count, size, -1).sum(axis=1)
+        if not binned.any():
             return False
-        ratio = float(np.sum(sums**2) / np.sum(each))
+        ratio = float(np.sum(sums**2) / np.sum(binned))
         if ratio > 1.0 + SURE * np.sqrt(2.0 / sums.size):
             return True
     return False

@@ -101,7 +101,9 @@ def _searched(
     for _ in range(PASSES):
         _, scan = _scan(group, functions, times, using, probability)
         new = {int(i) for i in np.flatnonzero(scan.probability < probability) if len(times[i]) < MOST}
-        extended = [tuple(sorted({*own, int(scan.at[i])})) if i in new else own for i, own in enumerate(times)]
+        extended = [
+            tuple(sorted({*accepted, int(scan.at[i])})) if i in new else accepted for i, accepted in enumerate(times)
+        ]
         if by_component is not None and extended != times:
             using = _noise(group, _rows(group, functions, extended), by_component=by_component)
         checked = _confirmed(group, functions, extended, using, probability)
@@ -127,10 +129,10 @@ def _criterion(found: SteppedFit, group: SeriesGroup, probability: float) -> flo
     Source: [SCHWARZ78].
     """
     t, _, d = group.values.shape
-    each = np.log(max(d * int(group.present.sum()), 2))
-    steps = len(found.steps) * (d * each + 2.0 * np.log(t) - 2.0 * np.log(probability))
+    logarithm = np.log(max(d * int(group.present.sum()), 2))
+    steps = len(found.steps) * (d * logarithm + 2.0 * np.log(t) - 2.0 * np.log(probability))
     strengths = 2 * int(np.count_nonzero(found.noise.wander)) + int(np.count_nonzero(found.noise.white))
-    return float(steps + strengths * each - 2.0 * found.fit.likelihood.sum())
+    return float(steps + strengths * logarithm - 2.0 * found.fit.likelihood.sum())
 
 
 def _noise(group: SeriesGroup, functions: Array, *, by_component: bool, beside: bool = False) -> SeriesNoise:
@@ -154,8 +156,8 @@ def _rows(group: SeriesGroup, functions: Array, times: list[tuple[int, ...]]) ->
         return functions
     t, s, _ = group.values.shape
     steps = np.zeros((t, s, most))
-    for i, own in enumerate(times):
-        for column, at in enumerate(own):
+    for i, accepted in enumerate(times):
+        for column, at in enumerate(accepted):
             steps[at:, i, column] = 1.0
     return np.concatenate([np.broadcast_to(functions[:, None], (t, s, functions.shape[1])), steps], axis=2)
 
@@ -166,13 +168,13 @@ def _scan(
     """Scan of all series, each beside its own steps; the fit has the functions' coefficients alone."""
     k, d = functions.shape[1], group.values.shape[2]
     found: list[tuple[np.ndarray, SeriesFit, StepScan]] = []
-    for count in sorted({len(own) for own in times}):
-        at = np.array([i for i, own in enumerate(times) if len(own) == count])
+    for count in sorted({len(accepted) for accepted in times}):
+        at = np.array([i for i, accepted in enumerate(times) if len(accepted) == count])
         part = group.part(at)
         rows = _rows(part, functions, [times[i] for i in at])
         fit, scan = scan_steps(part, rows, noise, limit=probability)
-        kept = {"coefficients": fit.coefficients[:, :k], "covariance": fit.covariance[:, : k * d, : k * d]}
-        found.append((at, SeriesFit(**{**vars(fit), **kept}), scan))
+        sizes = {"coefficients": fit.coefficients[:, :k], "covariance": fit.covariance[:, : k * d, : k * d]}
+        found.append((at, SeriesFit(**{**vars(fit), **sizes}), scan))
     order = np.argsort(np.concatenate([at for at, _, _ in found]))
 
     def joined(values: list[SeriesFit] | list[StepScan]) -> dict[str, Array]:
@@ -192,24 +194,24 @@ def _confirmed(
 ) -> list[tuple[int, ...]]:
     """Times of the steps that are significant, each beside the others of its series."""
     confirmed: list[tuple[int, ...]] = [()] * len(times)
-    for i, own in enumerate(times):
-        if own:
+    for i, accepted in enumerate(times):
+        if accepted:
             part = group.part(np.array([i]))
-            rest = own
-            while rest:
-                worst, at = max((_alone(part, functions, rest, one, noise, probability)[0], one) for one in rest)
+            waiting = accepted
+            while waiting:
+                worst, at = max((_alone(part, functions, waiting, one, noise, probability)[0], one) for one in waiting)
                 if worst < probability:
                     break
-                rest = tuple(one for one in rest if one != at)
-            confirmed[i] = rest
+                waiting = tuple(one for one in waiting if one != at)
+            confirmed[i] = waiting
     return confirmed
 
 
 def _alone(
-    part: SeriesGroup, functions: Array, own: tuple[int, ...], one: int, noise: SeriesNoise, probability: float
+    part: SeriesGroup, functions: Array, accepted: tuple[int, ...], one: int, noise: SeriesNoise, probability: float
 ) -> tuple[float, StepScan]:
     """Probability of the best step beside all but one, and its scan."""
-    others = tuple(at for at in own if at != one)
+    others = tuple(at for at in accepted if at != one)
     _, scan = scan_steps(part, _rows(part, functions, [others]), noise, limit=probability)
     return float(scan.probability[0]), scan
 
@@ -220,12 +222,12 @@ def _steps(
     """Sizes of the accepted steps, fitted together."""
     k, d = functions.shape[1], group.values.shape[2]
     steps = []
-    for i, own in enumerate(times):
-        if not own:
+    for i, accepted in enumerate(times):
+        if not accepted:
             continue
         part = group.part(np.array([i]))
-        fit, _ = scan_steps(part, _rows(part, functions, [own]), noise, limit=0.0)
-        for column, at in enumerate(own):
+        fit, _ = scan_steps(part, _rows(part, functions, [accepted]), noise, limit=0.0)
+        for column, at in enumerate(accepted):
             block = slice((k + column) * d, (k + column + 1) * d)
             steps.append(
                 SeriesStep(
@@ -233,7 +235,7 @@ def _steps(
                     at=at,
                     size=fit.coefficients[0, k + column],
                     covariance=fit.covariance[0, block, block],
-                    probability=_alone(part, functions, own, at, noise, probability)[0],
+                    probability=_alone(part, functions, accepted, at, noise, probability)[0],
                 )
             )
     return tuple(steps)

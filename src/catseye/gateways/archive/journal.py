@@ -162,8 +162,8 @@ def _points(
     """A row a point and epoch; covariance NaN for an epoch that has none."""
     solved = [s for s in solutions if s.answer.get("names")]
     names = [s.answer["names"] for s in solved]
-    rows = [len(each) for each in names]
-    flat = [name for each in names for name in each]
+    rows = [len(group) for group in names]
+    flat = [name for group in names for name in group]
     kinds = point_kinds(site, dict.fromkeys(flat), places_of(site))
     x = np.array([place for s in solved for place in s.answer["x"]], dtype=float).reshape(-1, 3)
     blocks = [_blocks(s.covariance, n) for s, n in zip(solved, rows, strict=True)]

@@ -33,9 +33,9 @@ def design_figures(study: DesignStudy) -> dict[str, Figure]:
         drawn = {"places": _places(study), "points": _points(study)}
         if study.numbers:
             drawn["numbers"] = _numbers(study)
-        for each in study.maps:
-            if np.isfinite(each.u).any():
-                drawn[map_name(each)] = _map(study, each)
+        for item in study.maps:
+            if np.isfinite(item.u).any():
+                drawn[map_name(item)] = _map(study, item)
         if study.path.values:
             drawn["search"] = _search(study)
     return drawn
@@ -136,8 +136,8 @@ def _obstacles(ax: Any, solids: Solids) -> None:
             rotation = np.array([(np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))])
             ax.add_patch(Polygon(corners @ rotation + centre, **style))
     for at, radius, frame in (
-        *((each.from_mm, each.radius_mm, each.frame) for each in solids.cylinder),
-        *((each.centre_mm, each.radius_mm, each.frame) for each in solids.sphere),
+        *((item.from_mm, item.radius_mm, item.frame) for item in solids.cylinder),
+        *((item.centre_mm, item.radius_mm, item.frame) for item in solids.sphere),
     ):
         if frame == GROUND:
             ax.add_patch(Circle((at[0] * MILLIMETRE, at[1] * MILLIMETRE), radius * MILLIMETRE, **style))

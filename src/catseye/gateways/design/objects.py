@@ -94,20 +94,20 @@ def _measured(check: ScatterCheck) -> str:
 def _map_passages(study: DesignStudy) -> list[Passage]:
     """Best place of one more ranger, and of the one that varies."""
     passages = []
-    for each in study.maps:
-        if not np.isfinite(each.u).any():
+    for item in study.maps:
+        if not np.isfinite(item.u).any():
             continue
-        row, column = np.unravel_index(np.nanargmin(each.u), each.u.shape)
-        at = f"x {each.x[column]:.0f} m, y {each.y[row]:.0f} m"
-        best = quantity(float(each.u[row, column]), "m")
-        if each.ranger:
-            worst = quantity(float(np.nanmax(each.u)), "m")
+        row, column = np.unravel_index(np.nanargmin(item.u), item.u.shape)
+        at = f"x {item.x[column]:.0f} m, y {item.y[row]:.0f} m"
+        best = quantity(float(item.u[row, column]), "m")
+        if item.ranger:
+            worst = quantity(float(np.nanmax(item.u)), "m")
             text = (
-                f"with the others as designed, {each.ranger} would give {best} at {at}, and {worst} at the worst place."
+                f"with the others as designed, {item.ranger} would give {best} at {at}, and {worst} at the worst place."
             )
         else:
             text = f"one more ranger on the ground would give {best} at {at}."
-        passages.append(Passage(f"The map of {each.ranger}" if each.ranger else "The map", text))
+        passages.append(Passage(f"The map of {item.ranger}" if item.ranger else "The map", text))
     return passages
 
 
@@ -139,8 +139,8 @@ def design_object(study: DesignStudy) -> dict[str, Any]:
         "numbers": [{"number": n.number, "u": n.u, "change": n.change} for n in study.numbers],
         "scatter": None if study.scatter is None else [_check(check) for check in study.scatter],
         "maps": [
-            {"ranger": each.ranger or None, "x": each.x.tolist(), "y": each.y.tolist(), "u": each.u.tolist()}
-            for each in study.maps
+            {"ranger": item.ranger or None, "x": item.x.tolist(), "y": item.y.tolist(), "u": item.u.tolist()}
+            for item in study.maps
         ],
         "search": {
             "seconds": study.seconds,

@@ -52,7 +52,7 @@ def design_report(study: DesignStudy, when: datetime, inputs: Mapping[str, str])
             _places(study, drawn["places"]),
             _points(study, drawn["points"]),
             _numbers(study, drawn.get("numbers")),
-            _drawings("maps", "Maps", [drawn.get(map_name(each)) for each in study.maps]),
+            _drawings("maps", "Maps", [drawn.get(map_name(item)) for item in study.maps]),
             _drawings("search", "Search", [drawn.get("search")]),
             _origin(study, when, inputs),
         ],
@@ -90,7 +90,7 @@ def _places(study: DesignStudy, drawing: Block) -> ReportSection:
         number("distance", "move", unit="m", digits=2),
         name="unit",
     )
-    varied = Text("Varied: " + "; ".join(each.text for each in study.varied) + ".")
+    varied = Text("Varied: " + "; ".join(item.text for item in study.varied) + ".")
     return ReportSection("places", "Places", [varied, drawing, TableBlock("moves", table)])
 
 
@@ -144,8 +144,8 @@ def write_design(
     }
     if study.numbers:
         files[NUMBERS.file] = lambda: NUMBERS.csv(study)
-    for each in study.maps:
-        files[f"{map_name(each)}.csv"] = lambda drawn=each: MAPS.csv(drawn)  # type: ignore[misc]
+    for item in study.maps:
+        files[f"{map_name(item)}.csv"] = lambda drawn=item: MAPS.csv(drawn)  # type: ignore[misc]
     for name, figure in figures.items():
         files[f"{name}.svg"] = lambda drawn=figure: svg(drawn)  # type: ignore[misc]
     written: Files = files

@@ -149,25 +149,27 @@ def surface_passages(series: "SurfaceNights") -> list[Passage]:
     return passages
 
 
-def certificates_passages(found: "NightCertificates") -> list[Passage]:
+def certificates_passages(answer: "NightCertificates") -> list[Passage]:
     """Night, and the next certificate to end."""
-    left = found.left
-    passages = [Passage("The night", f"{found.night}, {date_of(found.mjd)}: {len(left)} certificates.")]
-    ahead = np.where(left > 0.0, left, np.nan)
+    days = answer.left
+    passages = [Passage("The night", f"{answer.night}, {date_of(answer.mjd)}: {len(days)} certificates.")]
+    ahead = np.where(days > 0.0, days, np.nan)
     if np.isfinite(ahead).any():
         k = int(np.nanargmin(ahead))
         passages.append(
-            Passage("Next to end", f"{found.instrument[k]}, {date_of(found.valid_until[k])}, {left[k]:.0f} days after.")
+            Passage(
+                "Next to end", f"{answer.instrument[k]}, {date_of(answer.valid_until[k])}, {days[k]:.0f} days after."
+            )
         )
     return passages
 
 
-def nights_passages(found: "NightRows") -> list[Passage]:
+def nights_passages(answer: "NightRows") -> list[Passage]:
     """Number and span of the nights."""
-    if not found.count:
+    if not answer.count:
         return [Passage("Nights", "none in this span.")]
-    points, shots = int(found.rows["points"].max()), int(found.rows["shots"].sum())
-    return [Passage("Nights", f"{span_of(found.rows['mjd'])}; up to {points} points a night, {shots} shots.")]
+    points, shots = int(answer.rows["points"].max()), int(answer.rows["shots"].sum())
+    return [Passage("Nights", f"{span_of(answer.rows['mjd'])}; up to {points} points a night, {shots} shots.")]
 
 
 def sql_passages(rows: "SqlRows") -> list[Passage]:
@@ -175,27 +177,27 @@ def sql_passages(rows: "SqlRows") -> list[Passage]:
     return [Passage("Answer", f"{rows.count} rows of {', '.join(rows.columns)}.")]
 
 
-def again_passages(found: "ReReduction") -> list[Passage]:
+def again_passages(answer: "ReReduction") -> list[Passage]:
     """Differences, calibrations, shots and points in one result only."""
-    at = found.archived
-    worst = int(np.argmax(np.linalg.norm(found.change, axis=1))) if len(found.point) else 0
+    at = answer.archived
+    worst = int(np.argmax(np.linalg.norm(answer.change, axis=1))) if len(answer.point) else 0
     passages = [Passage("The night", f"{at.night}, {date_of(at.mjd)}, reduced by catseye {at.version} then.")]
-    if len(found.point):
-        over = np.nanmax(found.over_u, initial=0.0)
+    if len(answer.point):
+        over = np.nanmax(answer.over_u, initial=0.0)
         passages.append(
             Passage(
                 "Difference",
-                f"{len(found.point)} points; {found.point[worst]} moves most, by "
-                f"{_three(found.change[worst] / MILLIMETRE, '+.4f')} mm "
-                f"(u {_three(found.u_change[worst] / MILLIMETRE, '.4f')}); up to {over:.2g} of an archived u.",
+                f"{len(answer.point)} points; {answer.point[worst]} moves most, by "
+                f"{_three(answer.change[worst] / MILLIMETRE, '+.4f')} mm "
+                f"(u {_three(answer.u_change[worst] / MILLIMETRE, '.4f')}); up to {over:.2g} of an archived u.",
             )
         )
-    if found.changed:
-        more = len(found.changed) - MOST_NAMED
+    if answer.changed:
+        more = len(answer.changed) - MOST_NAMED
         tail = f" and {more} more" if more > 0 else ""
-        passages.append(Passage("Changed", f"{', '.join(found.changed[:MOST_NAMED])}{tail}."))
-    if found.selection:
-        passages.append(Passage("Shots", f"{found.selection} are used in one result only, which u leaves out."))
-    if found.lost or found.new:
-        passages.append(Passage("Points", f"{len(found.lost)} only in the archive, {len(found.new)} only today."))
+        passages.append(Passage("Changed", f"{', '.join(answer.changed[:MOST_NAMED])}{tail}."))
+    if answer.selection:
+        passages.append(Passage("Shots", f"{answer.selection} are used in one result only, which u leaves out."))
+    if answer.lost or answer.new:
+        passages.append(Passage("Points", f"{len(answer.lost)} only in the archive, {len(answer.new)} only today."))
     return passages

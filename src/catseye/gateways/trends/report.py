@@ -31,43 +31,43 @@ MOST_CHARTS = 24  # series that a report draws
 MOST_POINTS = 3000  # rows of a table of points
 
 
-def trends_report(found: TrendFindings, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
+def trends_report(findings: TrendFindings, when: datetime, inputs: Mapping[str, str]) -> ResultReport:
     """Report of an archive's trends.
 
     when     UTC
     inputs   SHA-256 of each index entry read, by night
     """
-    first, last = day(found.nights.mjd[0]), day(found.nights.mjd[-1])
+    first, last = day(findings.nights.mjd[0]), day(findings.nights.mjd[-1])
     return ResultReport(
         title="Trends of an archive",
         subtitle=f"{first} to {last}, by catseye on {when:%Y-%m-%d %H:%M} UTC; u = standard uncertainty, 1σ",
-        verdict=found.verdict,
-        cards=_cards(found),
-        passages=trend_passages(found),
+        verdict=findings.verdict,
+        cards=_cards(findings),
+        passages=trend_passages(findings),
         sections=[
-            _alarms(found),
-            _series(found),
-            *(_body(body, k) for k, body in enumerate(found.bodies)),
-            _poses(found),
-            _instruments(found),
-            _nights(found),
+            _alarms(findings),
+            _series(findings),
+            *(_body(body, k) for k, body in enumerate(findings.bodies)),
+            _poses(findings),
+            _instruments(findings),
+            _nights(findings),
             origin_section(when, inputs),
         ],
         label="Trends",
     )
 
 
-def _cards(found: TrendFindings) -> list[Card]:
-    alarms, warnings, notes = (found.count(severity) for severity in Severity)
-    points = sum(len(body.points.names) for body in found.bodies)
+def _cards(findings: TrendFindings) -> list[Card]:
+    alarms, warnings, notes = (findings.count(severity) for severity in Severity)
+    points = sum(len(body.points.names) for body in findings.bodies)
     return [
-        Card("Nights", str(len(found.nights)), f"{points} points in {len(found.bodies)} bodies"),
+        Card("Nights", str(len(findings.nights)), f"{points} points in {len(findings.bodies)} bodies"),
         Card("Alarms", str(alarms), f"{warnings} warnings, {notes} notes"),
-        Card("Tested", str(found.series), f"series; false alarm rate {found.false_alarm:g} for all together"),
+        Card("Tested", str(findings.series), f"series; false alarm rate {findings.false_alarm:g} for all together"),
     ]
 
 
-def _alarms(found: TrendFindings) -> ReportSection:
+def _alarms(findings: TrendFindings) -> ReportSection:
     from catseye.gateways.trends.figures import alarm_figure
     from catseye.gateways.writers.drawing import svg
 
@@ -83,7 +83,7 @@ def _alarms(found: TrendFindings) -> ReportSection:
             unit_of(alarm.quantity)[1],
             alarm.probability,
         )
-        for alarm in found.alarms
+        for alarm in findings.alarms
     ]
     table = ReportTable.of_rows(
         rows,
@@ -102,17 +102,17 @@ def _alarms(found: TrendFindings) -> ReportSection:
         "A step or a drift is listed where the whole archive would show one by chance with less than the stated false "
         "alarm rate. An alarm is larger than one night's standard uncertainty, a warning is smaller but sure."
     )
-    figure = alarm_figure(found)
+    figure = alarm_figure(findings)
     drawing = None if figure is None else DrawingBlock("alarms-in-time", svg(figure), "Alarms with a date, by kind.")
     return ReportSection("alarms", "Alarms", [Text(lead), drawing, TableBlock("alarms", table)])
 
 
-def _series(found: TrendFindings) -> ReportSection | None:
+def _series(findings: TrendFindings) -> ReportSection | None:
     """Charts of the series that changed."""
     from catseye.gateways.trends.figures import series_figure
     from catseye.gateways.writers.drawing import svg
 
-    series = drawn_series(found, found.alarms)
+    series = drawn_series(findings, findings.alarms)
     if not series:
         return None
     lead = (
@@ -225,8 +225,8 @@ def _points(body: BodyTrend) -> ReportTable:
     )
 
 
-def _poses(found: TrendFindings) -> ReportSection | None:
-    if not found.poses:
+def _poses(findings: TrendFindings) -> ReportSection | None:
+    if not findings.poses:
         return None
     blocks = [
         TableBlock(
@@ -234,16 +234,16 @@ def _poses(found: TrendFindings) -> ReportSection | None:
             _coefficients(pose.motion, pose.functions),
             f"{pose.poses.body}, {len(pose.poses.mjd)} nights.",
         )
-        for k, pose in enumerate(found.poses)
+        for k, pose in enumerate(findings.poses)
     ]
     return ReportSection("poses", "Poses", blocks)
 
 
-def _instruments(found: TrendFindings) -> ReportSection | None:
-    if not found.instruments:
+def _instruments(findings: TrendFindings) -> ReportSection | None:
+    if not findings.instruments:
         return None
     blocks: list[Block] = []
-    for k, (quantity, trend) in enumerate(found.instruments):
+    for k, (quantity, trend) in enumerate(findings.instruments):
         caption = f"{quantity.value.capitalize()}: {trend.parameter}."
         blocks.append(TableBlock(f"instruments-{k + 1}", _instrument_table(trend, *unit_of(quantity)), caption))
     return ReportSection("instruments", "Zeros, thermometers, scale", blocks)
@@ -272,11 +272,11 @@ def _instrument_table(trend: InstrumentTrend, scale: float, unit: str) -> Report
     )
 
 
-def _nights(found: TrendFindings) -> ReportSection:
+def _nights(findings: TrendFindings) -> ReportSection:
     from catseye.gateways.trends.figures import noise_figure
     from catseye.gateways.writers.drawing import svg
 
-    nights, figure = found.nights, noise_figure(found)
+    nights, figure = findings.nights, noise_figure(findings)
     chart = Chart(
         "scatter",
         Axis("date, MJD", "d", nights.mjd, digits=2),

@@ -230,9 +230,9 @@ def scene_of_layout(layout: DesignLayout, solids: Solids, *, claim: RangeVarianc
 
     Raises InputError for a solid that a telescope carries.
     """
-    carried = next((solid for solid in solids.all if solid.frame != GROUND), None)
-    if carried is not None:
-        raise InputError(f"{carried.name}: frame = {carried.frame!r} needs a site with a telescope (expected 'ground')")
+    moving = next((solid for solid in solids.all if solid.frame != GROUND), None)
+    if moving is not None:
+        raise InputError(f"{moving.name}: frame = {moving.frame!r} needs a site with a telescope (expected 'ground')")
     points = []
     for rangers in layout.rangers:
         for name, place in zip(rangers.names, rangers.places, strict=True):

@@ -85,8 +85,8 @@ class ReReduction:
         """Largest change of an axis over its archived standard uncertainty, (n,); nan for a point held fixed."""
         with np.errstate(invalid="ignore", divide="ignore"):
             ratios = np.abs(self.change) / np.where(self.archived_u > 0.0, self.archived_u, np.nan)
-        known = np.isfinite(ratios).any(axis=1)
-        return np.where(known, np.nanmax(np.where(known[:, None], ratios, 0.0), axis=1), np.nan)
+        finite = np.isfinite(ratios).any(axis=1)
+        return np.where(finite, np.nanmax(np.where(finite[:, None], ratios, 0.0), axis=1), np.nan)
 
     @property
     def largest(self) -> float:
@@ -123,7 +123,7 @@ def archived_points(archive: ArchiveFolder, night: str) -> ArchivedPoints:
         archive, "nights", ("mjd", "version", "air_model"), {"night": name}
     ).values()
     rows = select_rows(archive, "points", ("point", "body", *AXES, *PRODUCTS), {"night": name})
-    variances = np.column_stack([rows[each] for each in ("xx", "yy", "zz")])
+    variances = np.column_stack([rows[item] for item in ("xx", "yy", "zz")])
     return ArchivedPoints(
         night=name,
         mjd=float(mjd),
@@ -153,24 +153,26 @@ def reduced_again(
     now, network = _reduced(renewed, settings, progress)
     names = np.array(now.coordinates.points)
     at = {name: row for row, name in enumerate(names.tolist())}
-    both = np.array([k for k, name in enumerate(archived.point.tolist()) if name in at], dtype=int)
-    rows = np.array([at[name] for name in archived.point[both].tolist()], dtype=int)
-    covariance, selection = np.zeros((len(both), 3, 3)), 0
+    common = np.array([k for k, name in enumerate(archived.point.tolist()) if name in at], dtype=int)
+    rows = np.array([at[name] for name in archived.point[common].tolist()], dtype=int)
+    covariance, selection = np.zeros((len(common), 3, 3)), 0
     if changed:
         before, old = _reduced(campaign, settings, progress)
-        covariance = change_covariance(old, network, archived.point[both].tolist(), calibrated_anew(campaign, renewed))
+        covariance = change_covariance(
+            old, network, archived.point[common].tolist(), calibrated_anew(campaign, renewed)
+        )
         selection = sum(a != b for a, b in _used_of_both(before, now))
     x = now.coordinates.x[rows]
     return ReReduction(
         archived=archived,
         records="" if site is None else str(site.directory),
-        point=archived.point[both],
-        body=archived.body[both],
-        change=x - archived.x[both],
+        point=archived.point[common],
+        body=archived.body[common],
+        change=x - archived.x[common],
         covariance=covariance,
         x=x,
         u=now.coordinates.u[rows],
-        archived_u=archived.u[both],
+        archived_u=archived.u[common],
         changed=changed,
         selection=selection,
         lost=tuple(sorted(set(archived.point.tolist()) - set(at))),
@@ -243,17 +245,17 @@ def _rows_of(settled: SettledNetwork, owners: Mapping[str, set[str]]) -> tuple[n
             continue
         jacobian = full_jacobian(group, solution.x)
         of = [{network.layout.parameters[c].of for c in np.flatnonzero(row)} for row in jacobian]
-        chosen = np.flatnonzero([bool(each & names) and active for each, active in zip(of, fit.active, strict=True)])
+        chosen = np.flatnonzero([bool(item & names) and active for item, active in zip(of, fit.active, strict=True)])
         if len(chosen):
             designs.append(jacobian[chosen])
             weights.append(_weight(group, chosen))
     if not designs:
         return np.zeros((0, len(solution.x))), np.zeros((0, 0))
-    size = sum(len(each) for each in weights)
+    size = sum(len(item) for item in weights)
     weight, at = np.zeros((size, size)), 0
-    for each in weights:
-        weight[at : at + len(each), at : at + len(each)] = each
-        at += len(each)
+    for item in weights:
+        weight[at : at + len(item), at : at + len(item)] = item
+        at += len(item)
     return np.vstack(designs), weight
 
 

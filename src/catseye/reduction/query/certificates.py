@@ -86,17 +86,15 @@ def _validity(mjd: float, start: float, end: float) -> CertificateState:
 
 def _judged(instruments: list[str], validity: tuple[CertificateState, ...]) -> Verdict:
     bad = [
-        (name, each)
-        for name, each in zip(instruments, validity, strict=True)
-        if each in (CertificateState.EXPIRED, CertificateState.LATER)
+        (name, state)
+        for name, state in zip(instruments, validity, strict=True)
+        if state in (CertificateState.EXPIRED, CertificateState.LATER)
     ]
     if not bad:
         count = several(len(instruments), "certificate")
         if endless := validity.count(CertificateState.UNLIMITED):
             return Verdict("good", f"{count}, none of them expired; {endless} without an end of validity")
         return Verdict("good", f"{count}, all of them valid on the night")
-    name, each = bad[0]
-    return Verdict(
-        "doubtful",
-        f"{len(bad)} of {several(len(instruments), 'certificate')} not valid on the night, first {name} ({each.value})",
-    )
+    name, state = bad[0]
+    count = several(len(instruments), "certificate")
+    return Verdict("doubtful", f"{len(bad)} of {count} not valid on the night, first {name} ({state.value})")

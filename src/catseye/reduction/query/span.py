@@ -50,12 +50,12 @@ class ArchiveSpan:
             for night, word, why in zip(*(rows[key].tolist() for key in ("night", "verdict", "why")), strict=True)
             if night in wanted
         ]
-        bad = [each for each in judged if each[1] != "good"]
+        bad = [item for item in judged if item[1] != "good"]
         if not bad:
             return Verdict("good", good)
         night, word, why = bad[0]
         named = f"{len(bad)} of {len(judged)} nights are not good, first {night} ({word}: {why})"
-        return Verdict("failed" if all(each[1] == "failed" for each in judged) else "doubtful", named)
+        return Verdict("failed" if all(item[1] == "failed" for item in judged) else "doubtful", named)
 
 
 def several(count: int, noun: str) -> str:

@@ -81,8 +81,8 @@ class SurfaceNights:
     @property
     def rms(self) -> np.ndarray:
         """Root mean square (n,) m of the surface alone; nan where the noise hides it."""
-        own = self.column("measured") - self.column("noise")
-        return np.sqrt(np.where(own >= 0.0, own, np.nan))
+        noise_free = self.column("measured") - self.column("noise")
+        return np.sqrt(np.where(noise_free >= 0.0, noise_free, np.nan))
 
     def of_prisms(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Nights, mean half-path error and its scatter over the nights, m, of each prism, (k,) each."""
@@ -128,7 +128,7 @@ def surface_series(span: ArchiveSpan, aperture: LitAperture, progress: Progress 
     prisms, index = np.unique(rows["point"], return_inverse=True)
     axes = reflector_axes(rows["azimuth"][starts], rows["elevation"][starts])
     x, q = np.column_stack([rows[axis] for axis in AXES]), covariances(rows)
-    sums, seen = np.zeros((len(prisms), 2)), np.zeros(len(prisms))
+    sums, times = np.zeros((len(prisms), 2)), np.zeros(len(prisms))
     left_out: dict[str, str] = {}
     found: dict[int, NightSurface] = {}
     for number, (low, high) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
@@ -147,20 +147,20 @@ def surface_series(span: ArchiveSpan, aperture: LitAperture, progress: Progress 
             left_out[night] = str(problem)
             continue
         sums[at] += local[:, :2]
-        seen[at] += 1.0
+        times[at] += 1.0
     if not found:
         raise InputError(f"{span.archive.directory}: no night has a surface ({next(iter(left_out.values()))})")
-    kept = np.array(list(found), dtype=int)
-    nights = rows["night"][kept]
+    nights_of = np.array(list(found), dtype=int)
+    nights = rows["night"][nights_of]
     with np.errstate(invalid="ignore"):
-        places = sums / seen[:, None]
+        places = sums / times[:, None]
     return SurfaceNights(
         verdict=span.verdict(nights.tolist(), f"{several(len(nights), 'night')}, all of them good"),
         night=nights,
-        mjd=rows["mjd"][kept],
-        azimuth=rows["azimuth"][kept],
-        elevation=rows["elevation"][kept],
-        temperature_c=rows["temperature_c"][kept],
+        mjd=rows["mjd"][nights_of],
+        azimuth=rows["azimuth"][nights_of],
+        elevation=rows["elevation"][nights_of],
+        temperature_c=rows["temperature_c"][nights_of],
         surfaces=tuple(found.values()),
         terms=terms(ZERNIKE, "noll")[HELD:],
         prisms=prisms,
@@ -187,21 +187,21 @@ def _surface(local: np.ndarray, q: np.ndarray, rows: np.ndarray, aperture: LitAp
     of_fit = np.einsum("kp,pk->k", fit.design, fit.gain)
     after = variance * (1.0 - 2.0 * of_fit) + np.einsum("kp,pq,kq->k", fit.design, parameters, fit.design)
     cos = fit.cos_incidence
-    error, own = fit.deviation * cos, np.maximum(after, 0.0) * cos**2
+    error, noise_free = fit.deviation * cos, np.maximum(after, 0.0) * cos**2
     shares = weights / weights.sum()
     mean = float(shares @ error)
-    taken = (fit.design * cos[:, None], fit.gain / cos)  # of half-path errors
-    term, u_term = _terms(aperture.unit(fit.local), error, variance * cos**2, shares, taken)
+    removed = (fit.design * cos[:, None], fit.gain / cos)  # of half-path errors
+    term, u_term = _terms(aperture.unit(fit.local), error, variance * cos**2, shares, removed)
     return NightSurface(
         focal_length=fit.focal_length,
         u_focal_length=float(np.sqrt(parameters[-1, -1])),
         measured=float(shares @ error**2) - mean**2,
-        noise=float(shares @ own),
+        noise=float(shares @ noise_free),
         term=term,
         u_term=u_term,
         rows=rows,
         half_path=error,
-        u_half_path=np.sqrt(own),
+        u_half_path=np.sqrt(noise_free),
     )
 
 
@@ -210,7 +210,7 @@ def _terms(
     error: np.ndarray,
     variance: np.ndarray,
     shares: np.ndarray,
-    taken: tuple[np.ndarray, np.ndarray],
+    removed: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Zernike terms of the errors after the paraboloid, beyond those that it stands for, and their uncertainties.
 
@@ -223,5 +223,5 @@ def _terms(
     values = zernike(terms(ZERNIKE, "noll"), places[:, 0], places[:, 1])
     weighted = values * shares[:, None]
     gain = np.linalg.solve(values.T @ weighted, weighted.T)[HELD:]
-    behind = gain - (gain @ taken[0]) @ taken[1]
+    behind = gain - (gain @ removed[0]) @ removed[1]
     return gain @ error, np.sqrt((behind**2) @ variance)

@@ -249,9 +249,9 @@ def certificate_alarms(certificates: dict[str, np.ndarray], nights: ArchivedNigh
     """Certificates that had ended when nights were measured, or end soon."""
     alarms, last = [], float(nights.mjd[-1])
     for instrument in np.unique(certificates["instrument"]).tolist():
-        own = certificates["instrument"] == instrument
-        for kind in np.unique(certificates["kind"][own]):
-            at = np.flatnonzero(own & (certificates["kind"] == kind))
+        chosen = certificates["instrument"] == instrument
+        for kind in np.unique(certificates["kind"][chosen]):
+            at = np.flatnonzero(chosen & (certificates["kind"] == kind))
             newest = at[np.argmax(certificates["mjd"][at])]
             end = float(certificates["valid_until"][newest])
             if not np.isfinite(end) or end > last + SOON:

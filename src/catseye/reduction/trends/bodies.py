@@ -181,10 +181,10 @@ def bodies_in_frames(points: BodyPoints, nominal: Nominal) -> list[tuple[str, Bo
 
     Raises nothing; frames without points are absent.
     """
-    known = np.isfinite(points.azimuth) & np.isfinite(points.elevation)
+    finite = np.isfinite(points.azimuth) & np.isfinite(points.elevation)
     scatter = []
     for frame in FRAMES:
-        used = known if frame != "ground" else np.ones(len(points.mjd), bool)
+        used = finite if frame != "ground" else np.ones(len(points.mjd), bool)
         scatter.append(_scatter(_in_frame(points.x[used], points, used, frame, nominal)))
     best = np.zeros(len(points.names), int)
     least = scatter[0]
@@ -197,7 +197,7 @@ def bodies_in_frames(points: BodyPoints, nominal: Nominal) -> list[tuple[str, Bo
     for i, frame in enumerate(FRAMES):
         at = best == i
         if at.any():
-            used = known if frame != "ground" else np.ones(len(points.mjd), bool)
+            used = finite if frame != "ground" else np.ones(len(points.mjd), bool)
             some = measured(points.x[:, at]).any(axis=1)
             name = f"{points.name} ({frame})" if several else points.name
             found.append((frame, points.part(used & some, at, name)))
@@ -236,25 +236,25 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
     y = x - place
     arms = place - middle
     moving = determines_motion(arms)
-    known = np.zeros_like(y)
+    finite = np.zeros_like(y)
     outlier = np.zeros(y.shape[:2], bool)
     own, motion, found = None, None, None
     noise: SeriesNoise | None = None
     for _ in range(PASSES if moving and len(arms) < FEW_POINTS else 1):
-        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving, noise)
+        own, motion, outlier = _points_fit(points.mjd, y - finite, covariance, arms, rows, settings, moving, noise)
         fresh, noise = own.steps, own.noise
         if not fresh or not moving or len(arms) >= FEW_POINTS:
             break
         largest = max(float(np.linalg.norm(step.size)) for step in fresh)
         for step in fresh:
             if np.linalg.norm(step.size) >= LARGEST_SHARE * largest:
-                known[step.at :, step.series] += step.size
+                finite[step.at :, step.series] += step.size
     else:
-        own, motion, outlier = _points_fit(points.mjd, y - known, covariance, arms, rows, settings, moving, noise)
+        own, motion, outlier = _points_fit(points.mjd, y - finite, covariance, arms, rows, settings, moving, noise)
     assert own is not None
-    group = _group(points.mjd, motion, y - known, covariance, outlier)
-    if known.any():  # the known steps are fitted again, with all else
-        group = SeriesGroup(group.days, group.values + known, group.covariance)
+    group = _group(points.mjd, motion, y - finite, covariance, outlier)
+    if finite.any():  # the known steps are fitted again, with all else
+        group = SeriesGroup(group.days, group.values + finite, group.covariance)
         own = fit_with_steps(group, rows, probability=settings.probability, noise=own.noise)
     if motion is not None:
         found = _motion_fit(points.mjd, motion, rows, settings)
@@ -268,7 +268,7 @@ def fit_body(points: BodyPoints, frame: str, settings: TrendSettings, nominal: N
         motion=found,
         displacement=group.values
         if motion is None
-        else np.where(outlier[..., None], motion.residual + known, group.values),
+        else np.where(outlier[..., None], motion.residual + finite, group.values),
         spread=group.covariance,
         own=own,
         outlier=outlier,
@@ -314,13 +314,13 @@ def _points_fit(
 
 def _with_all(motion: NightlyMotion, y: Array, arms: Array, covariance: Array) -> NightlyMotion:
     """Motion with residuals of the outliers too."""
-    left = y - np.einsum("nij,tj->tni", rigid_design(arms), motion.six)
-    known = measured(motion.residual)
-    spread = np.where((known | ~measured(left))[..., None, None], motion.spread, covariance)
+    remainder = y - np.einsum("nij,tj->tni", rigid_design(arms), motion.six)
+    finite = measured(motion.residual)
+    spread = np.where((finite | ~measured(remainder))[..., None, None], motion.spread, covariance)
     return NightlyMotion(
         six=motion.six,
         covariance=motion.covariance,
-        residual=np.where(known[..., None], motion.residual, left),
+        residual=np.where(finite[..., None], motion.residual, remainder),
         spread=spread,
     )
 
@@ -376,18 +376,18 @@ def fit_motion(mjd: Array, six: Array, covariance: Array, rows: Array, settings:
 
 def _mean(values: Array) -> Array:
     """Mean over the first axis, missing values passed over; NaN where all are."""
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
+    finite = np.isfinite(values)
+    count = finite.sum(axis=0)
+    total = np.where(finite, values, 0.0).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _scatter(x: Array) -> Array:
     """Root mean square (n,) of places about their mean; infinity for fewer than two."""
     away = x - _mean(x)
-    known = measured(away)
-    square = np.where(known, np.sum(np.where(known[..., None], away, 0.0) ** 2, axis=2), 0.0).sum(axis=0)
-    count = known.sum(axis=0)
+    finite = measured(away)
+    square = np.where(finite, np.sum(np.where(finite[..., None], away, 0.0) ** 2, axis=2), 0.0).sum(axis=0)
+    count = finite.sum(axis=0)
     return np.where(count > 1, np.sqrt(square / np.maximum(count, 1)), np.inf)
 
 

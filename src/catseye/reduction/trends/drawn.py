@@ -62,10 +62,10 @@ def drawn_series(findings: TrendFindings, alarms: tuple[TrendAlarm, ...]) -> lis
 
 def point_series(body: BodyTrend, point: int) -> DrawnSeries:
     """Place of a point along its largest change: its steps' direction, or its drift's."""
-    own = [step for step in body.own.steps if step.series == point]
+    steps_of_point = [step for step in body.own.steps if step.series == point]
     coefficients = np.nan_to_num(body.own.fit.coefficients[point])
-    if own:
-        change = max((step.size for step in own), key=lambda size: float(np.linalg.norm(size)))
+    if steps_of_point:
+        change = max((step.size for step in steps_of_point), key=lambda size: float(np.linalg.norm(size)))
     else:
         change = coefficients[body.functions.names.index(YEAR)] if YEAR in body.functions.names else np.ones(3)
     size = float(np.linalg.norm(change))
@@ -74,7 +74,7 @@ def point_series(body: BodyTrend, point: int) -> DrawnSeries:
     value = body.displacement[:, point] @ along
     u = np.sqrt(np.maximum(np.einsum("i,tij,j->t", along, body.spread[:, point], along), 0.0))
     model = np.zeros(len(value))
-    for step in own:
+    for step in steps_of_point:
         model[step.at :] += float(step.size @ along)
     value, model = _lasting(value, model, rows, coefficients @ along, body.functions)
     return DrawnSeries(
@@ -86,7 +86,7 @@ def point_series(body: BodyTrend, point: int) -> DrawnSeries:
         u=u,
         model=model,
         outlier=body.outlier[:, point],
-        steps=tuple(float(body.points.mjd[step.at]) for step in own),
+        steps=tuple(float(body.points.mjd[step.at]) for step in steps_of_point),
     )
 
 

@@ -61,9 +61,9 @@ class InstrumentTrend:
     @property
     def night_u(self) -> Array:
         """Standard uncertainty (S,) of one night's value, scatter included."""
-        known = np.isfinite(self.u)
-        square = np.where(known, self.u, 0.0) ** 2
-        mean = square.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        finite = np.isfinite(self.u)
+        square = np.where(finite, self.u, 0.0) ** 2
+        mean = square.sum(axis=0) / np.maximum(finite.sum(axis=0), 1)
         return np.sqrt(mean + self.found.noise.white[0] ** 2 + self.found.noise.wander[0] ** 2)
 
     def latest(self, series: int) -> tuple[float, float]:
@@ -91,9 +91,9 @@ def fit_instruments(series: Sequence[SingleSeries], settings: TrendSettings) -> 
     for k, one in enumerate(series):
         at = np.searchsorted(mjd, one.mjd)
         values[at, k], u[at, k], warm[at, k] = one.value, one.u, one.temperature_c
-    known = np.isfinite(warm)
-    temperature = np.where(known.any(axis=1), np.where(known, warm, 0.0).sum(axis=1), np.nan) / np.maximum(
-        known.sum(axis=1), 1
+    finite = np.isfinite(warm)
+    temperature = np.where(finite.any(axis=1), np.where(finite, warm, 0.0).sum(axis=1), np.nan) / np.maximum(
+        finite.sum(axis=1), 1
     )
     functions = separated_functions(np.full(t, np.nan), temperature, mjd, posture=False, annual=False)
     rows = functions.rows(np.zeros(t), np.nan_to_num(temperature), mjd)
@@ -164,7 +164,7 @@ def ground_scale(body: BodyTrend, nights: ArchivedNights) -> SingleSeries | None
     good = enough & np.isfinite(scale) & np.isfinite(per_c) & (per_c > 0.0)
     if not good.any():
         return None
-    nothing = np.full(int(good.sum()), np.nan)
+    blank = np.full(int(good.sum()), np.nan)
     return SingleSeries(
         subject=body.name,
         parameter="scale",
@@ -172,8 +172,8 @@ def ground_scale(body: BodyTrend, nights: ArchivedNights) -> SingleSeries | None
         value=-(scale / per_c)[good],
         u=(weight**-0.5 / per_c)[good],
         temperature_c=body.points.temperature_c[good],
-        prior=nothing,
-        u_prior=nothing,
+        prior=blank,
+        u_prior=blank,
     )
 
 
@@ -192,10 +192,10 @@ def drift_probability(fit: SeriesFit, functions: TrendFunctions) -> tuple[Array,
     at = functions.names.index(YEAR)
     rate = fit.coefficients[:, at]
     covariance = fit.covariance.reshape(s, k, d, k, d)[:, at, :, at]
-    known = np.isfinite(rate).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2)) & (fit.degrees_of_freedom > 0)
-    spread = np.where(known[:, None, None], covariance, np.eye(d))
-    size = np.where(known[:, None], rate, 0.0)
+    finite = np.isfinite(rate).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2)) & (fit.degrees_of_freedom > 0)
+    spread = np.where(finite[:, None, None], covariance, np.eye(d))
+    size = np.where(finite[:, None], rate, 0.0)
     square = np.einsum("si,si->s", size, np.linalg.solve(spread, size[..., None])[..., 0]) / d
     n = np.maximum(fit.degrees_of_freedom, 1)
     factor = np.maximum(np.nan_to_num(fit.variance_factor, nan=1.0), 1e-6)
-    return rate, covariance, np.where(known, betainc(0.5 * n, 0.5 * d, n / (n + d * square / factor)), 1.0)
+    return rate, covariance, np.where(finite, betainc(0.5 * n, 0.5 * d, n / (n + d * square / factor)), 1.0)

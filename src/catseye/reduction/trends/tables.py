@@ -46,7 +46,7 @@ class ArchivedNights:
 
 
 @dataclass(frozen=True, eq=False)
-class PoseSeries:
+class PoseReadings:
     """Poses of one body.
 
     body            name
@@ -152,12 +152,12 @@ def read_body(
     return points.part(some_nights, some_points), stride
 
 
-def read_poses(archive: ArchiveFolder, bodies: Sequence[str], nights: ArchivedNights) -> list[PoseSeries]:
+def read_poses(archive: ArchiveFolder, bodies: Sequence[str], nights: ArchivedNights) -> list[PoseReadings]:
     """Poses of bodies; those with an unobserved direction are left out."""
     columns = ("body", "mjd", "elevation", "temperature_c", "unobserved", *POSE_PRODUCTS)
     columns += tuple(f"{what}_{axis}" for what in ("translation", "rotation") for axis in "xyz")
     rows = _of_nights(archive, "poses", columns, nights)
-    found = []
+    listed = []
     for body in bodies:
         at = np.flatnonzero((rows["body"] == body) & (rows["unobserved"] == ""))
         at = at[np.unique(rows["mjd"][at], return_index=True)[1]]
@@ -171,8 +171,8 @@ def read_poses(archive: ArchiveFolder, bodies: Sequence[str], nights: ArchivedNi
         good = np.isfinite(six).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2))
         good[good] = np.linalg.eigvalsh(_unit(covariance[good]))[:, 0] > 1e-10
         at, six, covariance = at[good], six[good], covariance[good]
-        found.append(
-            PoseSeries(
+        listed.append(
+            PoseReadings(
                 body=body,
                 mjd=rows["mjd"][at],
                 elevation=rows["elevation"][at],
@@ -181,7 +181,7 @@ def read_poses(archive: ArchiveFolder, bodies: Sequence[str], nights: ArchivedNi
                 covariance=covariance,
             )
         )
-    return found
+    return listed
 
 
 def _unit(covariance: Array) -> Array:
@@ -202,15 +202,15 @@ def read_zeros(archive: ArchiveFolder, nights: ArchivedNights) -> list[SingleSer
     """
     names = ("ranger", "parameter", "mjd", "value", "u", "prior", "u_prior", "temperature_c")
     rows = _of_nights(archive, "zeros", names, nights)
-    found = []
+    listed = []
     for ranger in np.unique(rows["ranger"]):
-        own = rows["ranger"] == ranger
-        for parameter in np.unique(rows["parameter"][own]):
-            at = np.flatnonzero(own & (rows["parameter"] == parameter))
+        chosen = rows["ranger"] == ranger
+        for parameter in np.unique(rows["parameter"][chosen]):
+            at = np.flatnonzero(chosen & (rows["parameter"] == parameter))
             at = at[np.unique(rows["mjd"][at], return_index=True)[1]]
             value, u = without_prior(*(rows[name][at] for name in ("value", "u", "prior", "u_prior")))
             good = np.isfinite(value) & np.isfinite(u) & (u > 0.0)
-            found.append(
+            listed.append(
                 SingleSeries(
                     subject=str(ranger),
                     parameter=str(parameter),
@@ -222,7 +222,7 @@ def read_zeros(archive: ArchiveFolder, nights: ArchivedNights) -> list[SingleSer
                     u_prior=rows["u_prior"][at][good],
                 )
             )
-    return [series for series in found if len(series.mjd)]
+    return [series for series in listed if len(series.mjd)]
 
 
 def without_prior(value: Array, u: Array, prior: Array, u_prior: Array) -> tuple[Array, Array]:
@@ -235,11 +235,11 @@ def without_prior(value: Array, u: Array, prior: Array, u_prior: Array) -> tuple
     ([1.0], [1.0])
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        known = np.isfinite(prior) & np.isfinite(u_prior) & (u_prior > 0.0)
-        own = u**-2.0 - np.where(known, u_prior**-2.0, 0.0)
+        finite = np.isfinite(prior) & np.isfinite(u_prior) & (u_prior > 0.0)
+        chosen = u**-2.0 - np.where(finite, u_prior**-2.0, 0.0)
         least = 1e-3 * u**-2.0  # a thousandth of the weight is rounding
-        weight = np.where(own > least, own, np.nan)
-        return (value * u**-2.0 - np.where(known, prior * u_prior**-2.0, 0.0)) / weight, weight**-0.5
+        weight = np.where(chosen > least, chosen, np.nan)
+        return (value * u**-2.0 - np.where(finite, prior * u_prior**-2.0, 0.0)) / weight, weight**-0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,12 +268,12 @@ def read_thermometers(archive: ArchiveFolder, nights: ArchivedNights) -> Station
     count = len(nights)
     means, scatters, by_ranges = [], [], []
     for station in stations:
-        own = (rows["station"] == station) & (when >= 0)
-        mean, scatter = _night_means(when[own], rows["temperature_c"][own], count)
+        chosen = (rows["station"] == station) & (when >= 0)
+        mean, scatter = _night_means(when[chosen], rows["temperature_c"][chosen], count)
         means.append(mean)
         scatters.append(scatter)
-        error, _ = _night_means(when[own], rows["t_error_c"][own], count)
-        u, _ = _night_means(when[own], rows["u_t_error_c"][own], count)
+        error, _ = _night_means(when[chosen], rows["t_error_c"][chosen], count)
+        u, _ = _night_means(when[chosen], rows["u_t_error_c"][chosen], count)
         by_ranges.append(_single(str(station), "ranges", nights, error, u))
     return StationReadings(
         stations=tuple(stations.tolist()),
@@ -288,20 +288,20 @@ def beside_others(readings: StationReadings, nights: ArchivedNights, doubted: fr
 
     doubted   stations that are compared, and nobody is compared with
     """
-    found = []
+    listed = []
     for k, station in enumerate(readings.stations):
         others = [j for j, other in enumerate(readings.stations) if j != k and other not in doubted]
         if others:
             away = readings.mean[k] - _column_median(readings.mean[others])
-            found.append(_single(station, "stations", nights, away, np.maximum(readings.scatter[k], LEAST_SCATTER)))
-    return [one for one in found if len(one.mjd)]
+            listed.append(_single(station, "stations", nights, away, np.maximum(readings.scatter[k], LEAST_SCATTER)))
+    return [one for one in listed if len(one.mjd)]
 
 
 def _single(subject: str, parameter: str, nights: ArchivedNights, value: Array, u: Array) -> SingleSeries:
     good = np.isfinite(value) & np.isfinite(u) & (u > 0.0)
     at = np.flatnonzero(good)
     at = at[np.unique(nights.mjd[at], return_index=True)[1]]
-    nothing = np.full(len(at), np.nan)
+    blank = np.full(len(at), np.nan)
     return SingleSeries(
         subject=subject,
         parameter=parameter,
@@ -309,8 +309,8 @@ def _single(subject: str, parameter: str, nights: ArchivedNights, value: Array, 
         value=value[at],
         u=u[at],
         temperature_c=nights.temperature_c[at],
-        prior=nothing,
-        u_prior=nothing,
+        prior=blank,
+        u_prior=blank,
     )
 
 
@@ -326,10 +326,10 @@ def _night_means(when: np.ndarray, values: Array, count: int) -> tuple[Array, Ar
 
 def _column_median(values: Array) -> Array:
     """Median of each column, missing values passed over; NaN where all are."""
-    known = np.isfinite(values).any(axis=0)
+    finite = np.isfinite(values).any(axis=0)
     result = np.full(values.shape[1], np.nan)
-    if known.any():
-        result[known] = np.nanmedian(values[:, known], axis=0)
+    if finite.any():
+        result[finite] = np.nanmedian(values[:, finite], axis=0)
     return result
 
 

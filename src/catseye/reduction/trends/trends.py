@@ -34,7 +34,7 @@ from catseye.reduction.trends.functions import TrendFunctions, separated_functio
 from catseye.reduction.trends.instruments import InstrumentTrend, drift_probability, fit_instruments, ground_scale
 from catseye.reduction.trends.tables import (
     ArchivedNights,
-    PoseSeries,
+    PoseReadings,
     SingleSeries,
     StationReadings,
     beside_others,
@@ -62,7 +62,7 @@ class PoseTrend:
     motion      shift and turn
     """
 
-    poses: PoseSeries
+    poses: PoseReadings
     functions: TrendFunctions
     motion: MotionTrend
 
@@ -207,7 +207,7 @@ def _bodies(
     progress: Progress | None,
 ) -> tuple[list[BodyTrend], list[SingleSeries]]:
     """Models of the points, body by body, and scales of the ground."""
-    found, scales = [], []
+    series_of, scales = [], []
     for name in names:
         points, stride = read_body(archive, name, nights, progress)
         if stride > 1:
@@ -223,12 +223,12 @@ def _bodies(
             except (InputError, EstimationError) as problem:
                 notes.append(f"{problem}; no model.")
                 continue
-            found.append(body)
+            series_of.append(body)
             notes.extend(_body_notes(body))
             scale = ground_scale(body, nights)
             if scale is not None:
                 scales.append(scale)
-    return found, scales
+    return series_of, scales
 
 
 def _body_notes(body: BodyTrend) -> list[str]:
@@ -246,7 +246,7 @@ def _body_notes(body: BodyTrend) -> list[str]:
     return notes
 
 
-def _pose(poses: PoseSeries, settings: TrendSettings) -> PoseTrend:
+def _pose(poses: PoseReadings, settings: TrendSettings) -> PoseTrend:
     functions = separated_functions(
         poses.elevation, poses.temperature_c, poses.mjd, harmonics=settings.harmonics, annual=settings.annual
     )
@@ -270,12 +270,12 @@ def _instruments(
     groups += [(TrendQuantity.THERMOMETER, list(readings.by_ranges)), (TrendQuantity.SCALE, scales)]
     if not zeros:
         notes.append("No night estimates a ranger's zero: zeros were not looked at.")
-    found = [(quantity, trend) for quantity, one in groups if (trend := fit_instruments(one, settings)) is not None]
+    series_of = [(quantity, trend) for quantity, one in groups if (trend := fit_instruments(one, settings)) is not None]
     if not readings.by_ranges:
         notes.append("No night estimates an error of a thermometer: thermometers were compared with each other alone.")
         beside = _beside_others(readings, nights, settings)
-        found += [] if beside is None else [(TrendQuantity.STATION, beside)]
-    return found
+        series_of += [] if beside is None else [(TrendQuantity.STATION, beside)]
+    return series_of
 
 
 def _beside_others(

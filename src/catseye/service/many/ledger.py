@@ -56,10 +56,10 @@ def opened(ledger: Path | None) -> Iterator[None]:
 def is_ledger(folder: Path) -> bool:
     """True for the folder of a ledger."""
     try:
-        found = json.loads((folder / MARK).read_text(encoding="utf-8"))
+        mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(found, dict) and found.get("format") == FORMAT
+    return isinstance(mark, dict) and mark.get("format") == FORMAT
 
 
 def remove(folder: Path) -> None:
@@ -77,10 +77,10 @@ def content_of(inputs: Sequence[Path], earlier: Files | None = None, hashed: flo
     for path in inputs:
         for file in _files_of(path):
             state = file.stat()
-            known = (earlier or {}).get(str(file))
+            entry_of_file = (earlier or {}).get(str(file))
             old = state.st_mtime + SETTLED < hashed
-            if known is not None and old and known[:2] == (state.st_size, state.st_mtime_ns):
-                files[str(file)] = known
+            if entry_of_file is not None and old and entry_of_file[:2] == (state.st_size, state.st_mtime_ns):
+                files[str(file)] = entry_of_file
             else:
                 files[str(file)] = (state.st_size, state.st_mtime_ns, _digest(file))
     return files
@@ -118,9 +118,11 @@ def read_entry(ledger: Path, unit: Unit) -> UnitOutcome | None:
             return None
         if (entry["format"], entry["name"], entry["key"]) != (FORMAT, unit.name, unit.key):
             return None
-        earlier: Files = {file: tuple(known) for file, known in entry["inputs"].items()}
+        earlier: Files = {file: tuple(entry_of_file) for file, entry_of_file in entry["inputs"].items()}
         files = content_of(unit.inputs, earlier, entry["hashed"])
-        if {file: known[2] for file, known in files.items()} != {file: known[2] for file, known in earlier.items()}:
+        if {file: entry_of_file[2] for file, entry_of_file in files.items()} != {
+            file: entry_of_file[2] for file, entry_of_file in earlier.items()
+        }:
             return None
         if unit.output is not None and _sizes(unit.output) != entry["output"]:
             return None

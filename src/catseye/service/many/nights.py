@@ -29,7 +29,7 @@ def night_units(nights: Sequence[Path], directory: Path, *, air_model: str) -> l
     key = hashlib.sha256("\n".join(("reduce", __version__, air_model)).encode()).hexdigest()
     places: dict[str, Path] = {}
     units = []
-    for night in (each.resolve() for each in nights):
+    for night in (path.resolve() for path in nights):
         name = night.name
         if name in places:
             raise ArgumentError(
