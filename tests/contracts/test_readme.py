@@ -86,7 +86,7 @@ def test_every_line_works_where_the_wheel_was_installed(wheel, tmp_path):
     venv.create(environment, with_pip=True)
     python = environment / "bin" / "python"
     constraints = ROOT / "constraints.txt"
-    subprocess.run([python, "-m", "pip", "install", "-q", "--constraint", constraints, wheel], check=True)
+    subprocess.run([python, "-m", "pip", "install", "-q", "--constraint", constraints, f"{wheel}[scale]"], check=True)
     (tmp_path / "work").mkdir()
     (site,) = (environment / "lib").glob("python*/site-packages")
     assert refused(run_there(tmp_path / "work", pieces(), python, site)) == []

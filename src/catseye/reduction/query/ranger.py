@@ -1,5 +1,6 @@
 """Zero of a ranger and its other parameters over the nights, and their drift."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from catseye.reduction.query.span import ArchiveSpan, several
 from catseye.verdict import Verdict
 
 ZERO = "zero"
+SHEET = ("night", "mjd", "instrument", "value")  # columns of certificates
 DAYS_PER_YEAR = 365.25  # Julian year
 CLEAR = 3.0  # standard uncertainties beyond which a drift is real: 99.7 %
 
@@ -124,7 +126,15 @@ def ranger_series(span: ArchiveSpan, ranger: str) -> RangerSeries:
 
 def _sheets(span: ArchiveSpan, ranger: str, nights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Head of each row's night, and its D0 less that of the last night, m; 0 where no sheet states one."""
-    sheets = span.table("certificates", "night", "mjd", "instrument", "value", ranger=ranger, kind="mirror")
+    return sheet_steps(span.table("certificates", *SHEET, ranger=ranger, kind="mirror"), nights)
+
+
+def sheet_steps(sheets: Mapping[str, np.ndarray], nights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Head of each row's night, and its D0 less that of the last night, m; 0 where no sheet states one.
+
+    sheets   columns `SHEET` of the mirrors that one ranger had
+    nights   (n,)
+    """
     if not len(sheets["night"]):
         return np.full(len(nights), ""), np.zeros(len(nights))
     last = int(np.argmax(sheets["mjd"]))

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.aliases import Array
 from catseye.estimation.series.correlated import measured
@@ -245,6 +246,11 @@ def calibration_alarms(trend: InstrumentTrend, certificates: dict[str, np.ndarra
     return alarms
 
 
+def _beyond(valid_until: ArrayLike) -> Array:
+    """MJD at which certificates no longer hold: the day after their last one begins."""
+    return np.asarray(np.floor(valid_until) + 1.0)
+
+
 def certificate_alarms(certificates: dict[str, np.ndarray], nights: ArchivedNights) -> list[TrendAlarm]:
     """Certificates that had ended when nights were measured, or end soon."""
     alarms, last = [], float(nights.mjd[-1])
@@ -257,8 +263,8 @@ def certificate_alarms(certificates: dict[str, np.ndarray], nights: ArchivedNigh
             if not np.isfinite(end) or end > last + SOON:
                 continue
             with np.errstate(invalid="ignore"):
-                after = int(np.sum(certificates["mjd"][at] > certificates["valid_until"][at]))
-            ended = end < last
+                after = int(np.sum(certificates["mjd"][at] >= _beyond(certificates["valid_until"][at])))
+            ended = bool(last >= _beyond(end))
             alarms.append(
                 TrendAlarm(
                     severity=Severity.ALARM if ended else Severity.WARNING,
@@ -318,8 +324,9 @@ def in_order(alarms: list[TrendAlarm]) -> tuple[TrendAlarm, ...]:
 
 
 def _end_of(certificates: dict[str, np.ndarray], instrument: str) -> float:
-    """End of an instrument's newest certificate, MJD; NaN without."""
-    at = np.flatnonzero((certificates["instrument"] == instrument) & np.isfinite(certificates["valid_until"]))
+    """End of the newest certificate of an instrument, or of what a ranger carries, MJD; NaN without."""
+    theirs = (certificates["instrument"] == instrument) | (certificates["ranger"] == instrument)
+    at = np.flatnonzero(theirs & np.isfinite(certificates["valid_until"]))
     return float(certificates["valid_until"][at[np.argmax(certificates["mjd"][at])]]) if len(at) else float("nan")
 
 

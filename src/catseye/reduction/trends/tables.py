@@ -2,19 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
 from catseye.aliases import Array, Progress
 from catseye.errors import InputError
 from catseye.estimation.series.correlated import measured
+from catseye.estimation.series.line import without_prior
+from catseye.records.archive.layout import POSE_PRODUCTS, PRODUCTS
 from catseye.records.archive.reading import ArchiveFolder, read_table
+from catseye.reduction.query.ranger import SHEET, ZERO, sheet_steps
 from catseye.reduction.trends.bodies import BodyPoints
 from catseye.reduction.trends.rigid import positive
 
 POSTURE = ("azimuth", "elevation", "temperature_c")
-PRODUCTS = ("xx", "xy", "xz", "yy", "yz", "zz")
-POSE_PRODUCTS = tuple(f"c{i}{j}" for i in range(1, 7) for j in range(i, 7))
 MOST_READINGS = 2_500_000  # of one kind of points: 0.5 GB; beyond it nights are passed over evenly
 LEAST_SCATTER = 1e-3  # degrees C, of a night's mean: a single reading tells none
 COLUMNS = ("point", "mjd", *POSTURE, "x", "y", "z", *PRODUCTS)
@@ -195,51 +197,38 @@ def _unit(covariance: Array) -> Array:
 def read_zeros(archive: ArchiveFolder, nights: ArchivedNights) -> list[SingleSeries]:
     """Zeros and other parameters of the rangers as the ranges alone show them: the calibration's share taken out.
 
-    An estimate with the calibration as its prior is the weighted mean of both; with weights by 1/u^2 the ranges' own
-    value follows. A night that adds nothing to the calibration is left out.
-
-    Source: [RAO73] section 4a: independent observations of one quantity.
+    A night that adds nothing to the calibration is left out. Zeros count from the D0 of the last night's sheet; another
+    head on the same ranger is another series, named after both.
     """
-    names = ("ranger", "parameter", "mjd", "value", "u", "prior", "u_prior", "temperature_c")
+    names = ("ranger", "parameter", "mjd", "value", "u", "u_adjusted", "prior", "u_prior", "temperature_c")
     rows = _of_nights(archive, "zeros", names, nights)
+    sheets = _of_nights(archive, "certificates", (*SHEET, "ranger", "kind"), nights)
     listed = []
     for ranger in np.unique(rows["ranger"]):
-        chosen = rows["ranger"] == ranger
-        for parameter in np.unique(rows["parameter"][chosen]):
-            at = np.flatnonzero(chosen & (rows["parameter"] == parameter))
-            at = at[np.unique(rows["mjd"][at], return_index=True)[1]]
-            value, u = without_prior(*(rows[name][at] for name in ("value", "u", "prior", "u_prior")))
-            good = np.isfinite(value) & np.isfinite(u) & (u > 0.0)
+        chosen = {name: values[rows["ranger"] == ranger] for name, values in rows.items()}
+        mirrors = (sheets["ranger"] == ranger) & (sheets["kind"] == "mirror")
+        heads, steps = sheet_steps({name: sheets[name][mirrors] for name in SHEET}, chosen["night"])
+        moved = np.where(chosen["parameter"] == ZERO, steps, 0.0)
+        u = np.where(np.isfinite(chosen["u_adjusted"]), chosen["u_adjusted"], chosen["u"])
+        value, u = without_prior(chosen["value"] + moved, u, chosen["prior"] + moved, chosen["u_prior"])
+        usable = np.isfinite(value) & np.isfinite(u)
+        different = np.unique(heads).tolist()
+        for parameter, head in product(np.unique(chosen["parameter"]), different):
+            at = np.flatnonzero(usable & (chosen["parameter"] == parameter) & (heads == head))
+            at = at[np.unique(chosen["mjd"][at], return_index=True)[1]]
             listed.append(
                 SingleSeries(
-                    subject=str(ranger),
+                    subject=str(ranger) if len(different) == 1 else f"{ranger} with {head or 'no sheet'}",
                     parameter=str(parameter),
-                    mjd=rows["mjd"][at][good],
-                    value=value[good],
-                    u=u[good],
-                    temperature_c=rows["temperature_c"][at][good],
-                    prior=rows["prior"][at][good],
-                    u_prior=rows["u_prior"][at][good],
+                    mjd=chosen["mjd"][at],
+                    value=value[at],
+                    u=u[at],
+                    temperature_c=chosen["temperature_c"][at],
+                    prior=(chosen["prior"] + moved)[at],
+                    u_prior=chosen["u_prior"][at],
                 )
             )
     return [series for series in listed if len(series.mjd)]
-
-
-def without_prior(value: Array, u: Array, prior: Array, u_prior: Array) -> tuple[Array, Array]:
-    """Value and standard uncertainty without the share of a prior; NaN where nothing is left.
-
-    Arrays (T,); a prior that is not known has no share.
-
-    >>> value, u = without_prior(*(np.array([v]) for v in (0.5, 0.5**0.5, 0.0, 1.0)))
-    >>> value.round(9).tolist(), u.round(9).tolist()
-    ([1.0], [1.0])
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        finite = np.isfinite(prior) & np.isfinite(u_prior) & (u_prior > 0.0)
-        chosen = u**-2.0 - np.where(finite, u_prior**-2.0, 0.0)
-        least = 1e-3 * u**-2.0  # a thousandth of the weight is rounding
-        weight = np.where(chosen > least, chosen, np.nan)
-        return (value * u**-2.0 - np.where(finite, prior * u_prior**-2.0, 0.0)) / weight, weight**-0.5
 
 
 @dataclass(frozen=True, eq=False)
