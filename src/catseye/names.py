@@ -1,4 +1,4 @@
-"""Names that files, options and registries share: air models and kinds of retroreflector.
+"""Names that files, options and registries share: air models and kinds of retroreflector; and counts of names.
 
 A registry imports the file of each name, so that a new air model or a new kind is its file and one word here. This
 module imports nothing, which keeps `--help` quick.
@@ -18,3 +18,12 @@ RETROREFLECTORS: Final[tuple[RetroreflectorName, ...]] = get_args(Retroreflector
 
 AIR_MODEL: Final = "ciddor_hill1999"  # of new work
 NOTES_AIR_MODEL: Final = "rueger1990"  # of the working notes, which version 1 of the campaign's layout prescribes
+
+
+def counted(count: int, noun: str) -> str:
+    """Number with its noun.
+
+    >>> counted(1, "night"), counted(365, "night")
+    ('1 night', '365 nights')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

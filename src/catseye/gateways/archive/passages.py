@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from catseye.gateways.writers.passage import Passage
+from catseye.names import counted
 from catseye.records.archive.layout import INPUTS, PROVENANCE, SAMPLES, TABLES
 from catseye.records.archive.verification import ArchiveCheck
 
@@ -91,12 +92,3 @@ def megabytes(size: float) -> str:
     ('9.36 MB', '0.012 MB')
     """
     return f"{size / MEGABYTE:.3g} MB" if size < 1e9 else f"{size / 1e9:.3g} GB"
-
-
-def counted(count: int, noun: str) -> str:
-    """Number with its noun.
-
-    >>> counted(1, "night"), counted(3, "file")
-    ('1 night', '3 files')
-    """
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -7,6 +7,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.gateways.writers.passage import Passage
+from catseye.names import counted
 from catseye.reduction.trends.alarms import AlarmKind, Severity, TrendAlarm, TrendQuantity
 from catseye.reduction.trends.bodies import BodyTrend, MotionTrend
 from catseye.reduction.trends.functions import TrendFunctions
@@ -24,6 +25,13 @@ def unit_of(quantity: TrendQuantity) -> tuple[float, str]:
     if quantity in LENGTHS:
         return MILLIMETRE, "mm"
     return 1.0, "°C" if quantity in DEGREES else ""
+
+
+def alarm_unit(alarm: TrendAlarm) -> tuple[float, str]:
+    """Unit in which an alarm's size is printed: its size in SI and its name; shares of readings in percent."""
+    if alarm.kind is AlarmKind.OUTLIERS:
+        return 0.01, "%"
+    return (1.0, "d") if alarm.kind is AlarmKind.GAP else unit_of(alarm.quantity)
 
 
 def day(mjd: float) -> str:
@@ -76,9 +84,8 @@ def trend_passages(found: TrendFindings) -> list[Passage]:
     )
     passages = [Passage("Archive", tested)]
     for body in found.bodies:
-        words = (
-            f"{len(body.points.names)} points in the {body.frame} frame; functions {', '.join(body.functions.names)}"
-        )
+        points, functions = counted(len(body.points.names), "point"), ", ".join(body.functions.names)
+        words = f"{points} in the {body.frame} frame; functions {functions}"
         if body.motion is not None:
             words += f"; a night's shift scatters by {1e3 * np.linalg.norm(body.motion.night_u[:3]):.3g} mm"
         passages.append(Passage(body.name.capitalize(), words))

@@ -7,7 +7,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, MILLIMETRE
 from catseye.estimation.series.correlated import measured
-from catseye.gateways.trends.objects import alarm_text, day, trend_passages, unit_of
+from catseye.gateways.trends.objects import alarm_text, alarm_unit, day, trend_passages, unit_of
 from catseye.gateways.writers.report import (
     Block,
     Card,
@@ -20,6 +20,7 @@ from catseye.gateways.writers.report import (
     origin_section,
 )
 from catseye.gateways.writers.report_parts import Axis, Chart, ReportTable, number, text, uncertainty
+from catseye.names import counted
 from catseye.reduction.trends.alarms import Severity
 from catseye.reduction.trends.bodies import BodyTrend, MotionTrend
 from catseye.reduction.trends.drawn import DrawnSeries, drawn_series
@@ -62,7 +63,7 @@ def _cards(findings: TrendFindings) -> list[Card]:
     points = sum(len(body.points.names) for body in findings.bodies)
     return [
         Card("Nights", str(len(findings.nights)), f"{points} points in {len(findings.bodies)} bodies"),
-        Card("Alarms", str(alarms), f"{warnings} warnings, {notes} notes"),
+        Card("Alarms", str(alarms), f"{counted(warnings, 'warning')}, {counted(notes, 'note')}"),
         Card("Tested", str(findings.series), f"series; false alarm rate {findings.false_alarm:g} for all together"),
     ]
 
@@ -78,9 +79,9 @@ def _alarms(findings: TrendFindings) -> ReportSection:
             alarm.kind.value,
             day(alarm.mjd),
             alarm_text(alarm),
-            alarm.value / unit_of(alarm.quantity)[0],
-            alarm.u / unit_of(alarm.quantity)[0],
-            unit_of(alarm.quantity)[1],
+            alarm.value / alarm_unit(alarm)[0],
+            alarm.u / alarm_unit(alarm)[0],
+            alarm_unit(alarm)[1],
             alarm.probability,
         )
         for alarm in findings.alarms

@@ -9,6 +9,7 @@ from catseye.aliases import Progress
 from catseye.errors import InputError
 from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
+from catseye.names import counted
 from catseye.records.archive.layout import AXES, PRODUCTS
 from catseye.records.archive.reading import ArchiveFolder
 from catseye.records.night.campaign import Campaign, ObservedSite
@@ -20,7 +21,6 @@ from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.settling import SettledNetwork
 from catseye.reduction.query.renewed import calibrated_anew, changed_records, with_records
-from catseye.reduction.query.span import several
 from catseye.verdict import Verdict
 
 
@@ -103,7 +103,7 @@ class ReReduction:
             own = Verdict("good", "every coordinate is the same to the last bit")
         elif self.records:
             moved = f"points move by up to {self.largest * 1e3:.3f} mm"
-            own = Verdict("good", f"{several(len(self.changed), 'record')} changed, {moved}")
+            own = Verdict("good", f"{counted(len(self.changed), 'record')} changed, {moved}")
         else:
             own = Verdict(
                 "doubtful",

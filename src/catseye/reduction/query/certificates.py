@@ -6,7 +6,8 @@ from enum import Enum
 import numpy as np
 
 from catseye.errors import InputError
-from catseye.reduction.query.span import ArchiveSpan, several
+from catseye.names import counted
+from catseye.reduction.query.span import ArchiveSpan
 from catseye.verdict import Verdict
 
 
@@ -91,10 +92,10 @@ def _judged(instruments: list[str], validity: tuple[CertificateState, ...]) -> V
         if state in (CertificateState.EXPIRED, CertificateState.LATER)
     ]
     if not bad:
-        count = several(len(instruments), "certificate")
+        count = counted(len(instruments), "certificate")
         if endless := validity.count(CertificateState.UNLIMITED):
             return Verdict("good", f"{count}, none of them expired; {endless} without an end of validity")
         return Verdict("good", f"{count}, all of them valid on the night")
     name, state = bad[0]
-    count = several(len(instruments), "certificate")
+    count = counted(len(instruments), "certificate")
     return Verdict("doubtful", f"{len(bad)} of {count} not valid on the night, first {name} ({state.value})")

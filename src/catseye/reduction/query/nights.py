@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.reduction.query.span import ArchiveSpan, several
+from catseye.names import counted
+from catseye.reduction.query.span import ArchiveSpan
 from catseye.verdict import Verdict
 
 COLUMNS = (
@@ -37,5 +38,5 @@ def night_rows(span: ArchiveSpan) -> NightRows:
     rows = {name: values[order] for name, values in rows.items()}
     bad = [night for night, word in zip(rows["night"], rows["verdict"], strict=True) if word != "good"]
     if not bad:
-        return NightRows(Verdict("good", f"{several(len(order), 'night')}, all of them good"), rows)
+        return NightRows(Verdict("good", f"{counted(len(order), 'night')}, all of them good"), rows)
     return NightRows(Verdict("doubtful", f"{len(bad)} of {len(order)} nights are not good, first {bad[0]}"), rows)

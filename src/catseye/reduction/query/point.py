@@ -7,8 +7,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from catseye.errors import InputError
+from catseye.names import counted
 from catseye.records.archive.layout import AXES, PRODUCTS
-from catseye.reduction.query.span import ArchiveSpan, several
+from catseye.reduction.query.span import ArchiveSpan
 from catseye.verdict import Verdict
 
 PointFrame = Literal["ground", "reflector"]
@@ -106,7 +107,7 @@ def point_series(span: ArchiveSpan, point: str, frame: PointFrame = "ground") ->
     return PointSeries(
         point=point,
         frame=frame,
-        verdict=span.verdict(nights.tolist(), f"{several(len(nights), 'night')}, all of them good"),
+        verdict=span.verdict(nights.tolist(), f"{counted(len(nights), 'night')}, all of them good"),
         night=nights,
         mjd=rows["mjd"][kept],
         body=rows["body"][kept],

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from catseye.names import counted
 from catseye.records.archive.layout import AXES, POSE_PRODUCTS
-from catseye.reduction.query.span import ArchiveSpan, several
+from catseye.reduction.query.span import ArchiveSpan
 from catseye.verdict import Verdict
 
 UPPER = np.triu_indices(6)
@@ -66,7 +67,7 @@ def pose_series(span: ArchiveSpan, body: str) -> PoseSeries:
     upper = np.column_stack([rows[name] for name in POSE_PRODUCTS])
     covariance[:, UPPER[0], UPPER[1]] = upper
     covariance[:, UPPER[1], UPPER[0]] = upper
-    good = f"{several(len(rows['night']), 'night')}, all of them good"
+    good = f"{counted(len(rows['night']), 'night')}, all of them good"
     return PoseSeries(
         body=body,
         verdict=span.verdict(rows["night"].tolist(), good),

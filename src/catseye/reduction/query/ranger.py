@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from catseye.estimation.series.line import LineFit, fit_line, without_prior
-from catseye.reduction.query.span import ArchiveSpan, several
+from catseye.names import counted
+from catseye.reduction.query.span import ArchiveSpan
 from catseye.verdict import Verdict
 
 ZERO = "zero"
@@ -120,7 +121,7 @@ def ranger_series(span: ArchiveSpan, ranger: str) -> RangerSeries:
     for name in ("value", "prior"):
         rows[name] = np.where(rows["parameter"] == ZERO, rows[name] + d0, rows[name])
     nights = set(rows["night"].tolist())
-    good = f"{several(len(nights), 'night')}, all of them good"
+    good = f"{counted(len(nights), 'night')}, all of them good"
     return RangerSeries(ranger=ranger, verdict=span.verdict(nights, good), head=heads, **rows)
 
 

@@ -56,12 +56,3 @@ class ArchiveSpan:
         night, word, why = bad[0]
         named = f"{len(bad)} of {len(judged)} nights are not good, first {night} ({word}: {why})"
         return Verdict("failed" if all(item[1] == "failed" for item in judged) else "doubtful", named)
-
-
-def several(count: int, noun: str) -> str:
-    """Number with its noun.
-
-    >>> several(1, "night"), several(365, "night")
-    ('1 night', '365 nights')
-    """
-    return f"{count} {noun}{'' if count == 1 else 's'}"

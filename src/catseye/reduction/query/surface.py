@@ -8,12 +8,13 @@ from catseye.aliases import Progress
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.shapes.paraboloid import place_paraboloid
 from catseye.geometry.frames.frame import Transform
+from catseye.names import counted
 from catseye.optics.aperture import cells
 from catseye.optics.zernike import Term, terms, zernike
 from catseye.records.archive.layout import AXES, PRODUCTS
 from catseye.records.archive.reading import read_table
 from catseye.reduction.query.point import covariances, pivots_of, reflector_axes
-from catseye.reduction.query.span import ArchiveSpan, several
+from catseye.reduction.query.span import ArchiveSpan
 from catseye.reduction.surface.shape import LitAperture
 from catseye.verdict import Verdict
 
@@ -155,7 +156,7 @@ def surface_series(span: ArchiveSpan, aperture: LitAperture, progress: Progress 
     with np.errstate(invalid="ignore"):
         places = sums / times[:, None]
     return SurfaceNights(
-        verdict=span.verdict(nights.tolist(), f"{several(len(nights), 'night')}, all of them good"),
+        verdict=span.verdict(nights.tolist(), f"{counted(len(nights), 'night')}, all of them good"),
         night=nights,
         mjd=rows["mjd"][nights_of],
         azimuth=rows["azimuth"][nights_of],

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from catseye.gateways.writers.passage import Passage
+from catseye.names import counted
 from catseye.service.many.unit import UnitOutcome
 from catseye.verdict import Verdict
 
@@ -22,7 +23,7 @@ def outcome_verdict(outcome: UnitOutcome) -> Verdict:
 def many_verdict(outcomes: Sequence[UnitOutcome], noun: str) -> Verdict:
     """Verdict on all: good where every unit is done and good, else the worst with its counts."""
     verdicts = [outcome_verdict(outcome) for outcome in outcomes]
-    total = _counted(len(outcomes), noun)
+    total = counted(len(outcomes), noun)
     if broken := sum(outcome.state == "failed" for outcome in outcomes):
         return Verdict("failed", f"{broken} of {total} {'has' if broken == 1 else 'have'} no result")
     bad = {word: sum(verdict.word == word for verdict in verdicts) for word in WORDS}
@@ -39,7 +40,7 @@ def many_passages(outcomes: Sequence[UnitOutcome], noun: str) -> list[Passage]:
     """Counts and times, and a passage for each unit that failed or is not good."""
     failed = [outcome for outcome in outcomes if outcome.state == "failed"]
     resumed = sum(outcome.state == "resumed" for outcome in outcomes)
-    text = f"{len(outcomes) - len(failed)} of {_counted(len(outcomes), noun)} done"
+    text = f"{len(outcomes) - len(failed)} of {counted(len(outcomes), noun)} done"
     text += f", {resumed} of them in an earlier run" if resumed else ""
     if seconds := [outcome.seconds for outcome in outcomes if outcome.state != "failed"]:
         text += f"; each took {statistics.median(seconds):.2g} s at the median, {max(seconds):.2g} s at most"
@@ -50,12 +51,3 @@ def many_passages(outcomes: Sequence[UnitOutcome], noun: str) -> list[Passage]:
         if outcome.state != "failed" and verdict.word != "good":
             passages.append(Passage(verdict.word.capitalize(), f"{outcome.name}: {verdict.why.rstrip('.')}."))
     return passages
-
-
-def _counted(count: int, noun: str) -> str:
-    """Number with its noun.
-
-    >>> _counted(1, "night"), _counted(12, "night")
-    ('1 night', '12 nights')
-    """
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
