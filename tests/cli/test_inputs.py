@@ -34,6 +34,7 @@ READ = [
     *(
         "addresses",
         "against",
+        "archive",
         "as_left",
         "calibrations",
         "campaign",

@@ -110,7 +110,8 @@ def shown(*words):
         os.setsid()
         fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "TERM": "xterm-256color"}
+    size = {"COLUMNS": "80", "LINES": "24"}  # as some shells export it; the terminal's own counts
+    environment = {**os.environ, **size, "OPENBLAS_NUM_THREADS": "1", "TERM": "xterm-256color"}
     process = subprocess.Popen(
         [str(word) for word in words],
         stdin=terminal.theirs,

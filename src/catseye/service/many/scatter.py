@@ -127,7 +127,7 @@ def _band(terms: int) -> tuple[float, float]:
 
     >>> low, high = _band(1000)
     >>> round(low, 3), round(high, 3)
-    (0.942, 1.057)
+    (0.943, 1.058)
     """
     from scipy.special import gammaincinv
 

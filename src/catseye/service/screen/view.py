@@ -4,7 +4,7 @@ import asyncio
 import os
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
@@ -40,7 +40,7 @@ class ScreenView(SilentView):
     def __init__(
         self, console: Console | None = None, keyboard: "Callable[[Callable[[str], None]], Keyboard]" = Keyboard
     ):
-        self._console = console or Console(stderr=True, highlight=False)
+        self._console = console or Console(stderr=True, highlight=False, _environ=_without_size(os.environ))
         self._pane = Pane(cast("TextIO", self._console.file))
         self._keyboard = keyboard(self._press)
         self._stack = ExitStack()
@@ -246,3 +246,8 @@ class ScreenView(SilentView):
             ziy.set_mode(self._paused_from)
             self._paused_from = None
             self._say("measuring resumes")
+
+
+def _without_size(environment: Mapping[str, str]) -> dict[str, str]:
+    """Environment without a terminal's size at some earlier time, which would hold after it is resized."""
+    return {name: value for name, value in environment.items() if name not in ("COLUMNS", "LINES")}
