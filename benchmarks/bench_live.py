@@ -158,7 +158,7 @@ def solver_cpu(running: LiveCoordinator) -> float:
 
 
 async def by_hand(child: LoadChild, path: Path, seconds: float, *, as_json: bool) -> Measurement:
-    """What a user would write: a task a ranger, a commit a shot.
+    """Program that a user would write: a task a ranger, a commit a shot.
 
     A task that finds lines in its buffer never waits, so after each shot it lets the others run: or a disk slower than
     the rangers would keep this program from its clock, and the measurement from its end.
@@ -358,7 +358,7 @@ async def postgresql(options: argparse.Namespace) -> None:
 
 
 def special() -> bool:
-    """Whether one of the long measurements was asked for, and done."""
+    """True if one of the long measurements was wanted, and done."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--rangers", type=int, default=RANGERS)

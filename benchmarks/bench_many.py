@@ -1,4 +1,4 @@
-"""What many nights cost: processes and a local cluster of dask beside one worker and beside a loop of commands.
+"""Cost of many nights: processes and a local cluster of dask beside one worker and beside a loop of commands.
 
 python benchmarks/bench_many.py [--quick]
 python benchmarks/bench_many.py --nights   100 nights of 60 prisms and 12 of 2209: digests, speed-up, memory, an hour
@@ -98,7 +98,7 @@ def alone(nights: Sequence[Path]) -> float:
 
 
 def commands(nights: Sequence[Path], out: Path) -> None:
-    """What a user does without: the command once for each night."""
+    """Commands of a user without it: the command once for each night."""
     for night in nights:
         words = [sys.executable, "-m", "catseye", "reduce", str(night), "--out", str(out), "--quiet"]
         subprocess.run(words, check=True, env={**os.environ, "OPENBLAS_NUM_THREADS": "1"})

@@ -1,4 +1,4 @@
-"""What the main job costs, from a night's samples to coordinates, beside what a user would pick instead.
+"""Cost of the main job, from a night's samples to coordinates, beside what a user would pick instead.
 
 python benchmarks/bench_reduce.py [--quick] [--curves]
 python benchmarks/bench_reduce.py --files   what commands take of the whole dish, files and page with them

@@ -1,4 +1,4 @@
-"""What this machine can do at most, one thread: read and write memory, multiply and add, take roots, flush a disk.
+"""Limits of this machine, one thread: read and write memory, multiply and add, take roots, flush a disk.
 
 Compiled loops. A row's own limit is made of them in its script, within the same rounds; `measured` is what stands above
 the table.

@@ -11,7 +11,7 @@ from catseye.estimation.design.network import LEAST_U_ZERO, DesignNetwork, Desig
 
 @dataclass(frozen=True, eq=False)
 class AddedRanger:
-    """DesignPrediction of a network with one ranger more, for criteria of the network's own points.
+    """Prediction of a network with one ranger more, for criteria of the network's own points.
 
     network      without it
     covariance   (n, 3, 3) m^2, of the network's points

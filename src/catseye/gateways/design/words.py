@@ -15,7 +15,7 @@ COMPASS = ("north", "north-east", "east", "south-east", "south", "south-west", "
 
 
 def quantity_of(aim: DesignAim) -> str:
-    """What the criterion's number is.
+    """Name of the criterion's number.
 
     >>> quantity_of(DesignAim("worst", ("A",)))
     'u along the worst axis'

@@ -28,7 +28,7 @@ class InputFile:
 
 @dataclass(frozen=True)
 class NightProvenance:
-    """What a night's results were made of.
+    """Provenance of a night's results: inputs and versions.
 
     night      identifier
     inputs     files that come back when the night is restored

@@ -18,7 +18,7 @@ EPSILON = 1e-6  # m: within it a place is where its region allows it
 
 @dataclass(frozen=True, eq=False)
 class MovingUnit:
-    """What moves as one: a ranger, a target or a triplet.
+    """Unit that moves as one: a ranger, a target or a triplet.
 
     name       of it
     rows       of its points in the scene
@@ -84,7 +84,7 @@ class MovingUnit:
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """What rangers keep clear of.
+    """Obstacles that rangers keep clear of.
 
     apart       m, least distance between two rangers
     clearance   m, least distance of a ranger from every solid

@@ -33,7 +33,7 @@ EXPECTED = (
 
 @dataclass(frozen=True)
 class Variation:
-    """What may change of a design.
+    """Variation of a design: its units, places and numbers.
 
     role      of the points
     pattern   of their names; "" for all: of rangers those on the ground

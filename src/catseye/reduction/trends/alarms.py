@@ -45,7 +45,7 @@ class AlarmKind(Enum):
 
 
 class TrendQuantity(Enum):
-    """TrendQuantity of a series."""
+    """Quantity of a series, as reports print it."""
 
     POINT = "point"
     BODY = "body"

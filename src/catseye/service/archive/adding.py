@@ -10,7 +10,7 @@ from catseye.service.many.unit import UnitOutcome
 
 @dataclass(frozen=True)
 class ArchiveChange:
-    """What became of an archive.
+    """Change of an archive: nights added, removed, replaced, joined.
 
     outcomes   of each campaign and each run of a journal
     removed    identifiers of nights that were removed
