@@ -14,7 +14,7 @@ from repository import ROOT
 PAGE = ROOT / "docs" / "components.md"
 LOCK = ROOT / "front" / "package-lock.json"
 BUILT_IN = ("clsx", "esm-env", "svelte", "uplot")  # what Vite puts into the files; svelte brings the first two
-FOR_DEVELOPERS = ("dev", "test-web")  # extras
+FOR_DEVELOPERS = ("dev", "docs", "test-web")  # extras
 REQUIREMENT = re.compile(r"^([A-Za-z0-9._-]+)(?:\[([^\]]*)\])?[^;]*(?:;(.*))?$")  # name, its extras, marker
 EXTRA = re.compile(r"extra == ['\"]([^'\"]+)['\"]")
 LONGEST = 40  # characters of a licence; some packages state its whole text
