@@ -176,10 +176,11 @@ def markdown(words: str, command: Any) -> str:
     lines, notes = examples(command.epilog or "")
     parts = [marked(command.help or ""), _literal(synopsis(words, command), "text"), _literal("\n".join(lines), "console")]
     parts += [marked(note if note.endswith(".") else f"{note}.") for note in notes]
-    named = functions(words)
-    if named:
+    ends = "[Exit status](/commands.md)"
+    if named := functions(words):
         roles = " and, for several, ".join(f"{{py:func}}`catseye.{name}`" for name in named)
-        parts.append(f"In Python: {roles}.")
+        ends = f"In Python: {roles}. {ends}"
+    parts.append(f"{ends}: as for every command.")
     parts.append(f"```{{program}} catseye {words}\n```")
     for title, kind in (("Arguments", "argument"), ("Options", "option")):
         parameters = [each for each in command.params if each.param_type_name == kind]
