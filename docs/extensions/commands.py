@@ -30,7 +30,8 @@ TYPES = {bool: "flag", int: "integer", float: "number", str: "text", Path: "path
 WIDTH = 76  # characters of a synopsis
 PROBES = (float("nan"), -1e30, 1e30)  # values that no range holds
 EXAMPLE = re.compile(r"\s*(?:(?P<label>[^:]+):\s+)?(?P<command>catseye .+)")
-LIMITS = re.compile(r"expected (?P<a>[^()]+)\)|is not (?P<b>within .+|above zero.*|a finite number|a probability .+)\.$")
+EXPECTED = re.compile(r"expected ([^()]+)\)")
+REFUSED = re.compile(r"is not (?:a )?(?:time )?(?:within )?(.+)\.$")
 
 
 def commands() -> dict[str, Any]:
@@ -54,10 +55,15 @@ def functions(words: str) -> list[str]:
     return [each for each in (name, OF_SEVERAL.get(words)) if each and hasattr(catseye, each)]
 
 
+def parameters_of(command: Any, kind: str) -> list[Any]:
+    """Parameters of a command that `--help` shows, of kind "argument" or "option"."""
+    return [each for each in command.params if each.param_type_name == kind and not getattr(each, "hidden", False)]
+
+
 def synopsis(words: str, command: Any) -> str:
     """Usage of a command, in lines of at most WIDTH characters."""
-    pieces = [spelling(each) for each in command.params if each.param_type_name == "argument"]
-    pieces += [_piece(parameter) for parameter in command.params if parameter.param_type_name == "option"]
+    pieces = [spelling(each) for each in parameters_of(command, "argument")]
+    pieces += [_piece(each) for each in parameters_of(command, "option")]
     lines = [f"catseye {words}"]
     for piece in sorted(pieces, key=lambda piece: piece.startswith("[-")):
         if len(lines[-1]) + 1 + len(piece) > WIDTH:
@@ -115,9 +121,8 @@ def range_of(parameter: Any) -> str:
         try:
             check([value] if is_list(parameter) else value)
         except typer.BadParameter as problem:
-            if match := LIMITS.search(problem.message):
-                text = (match["a"] or match["b"]).removeprefix("within ").removeprefix("a ")
-                return re.sub(r"e\+(\d+)", r"e\1", text)
+            if match := EXPECTED.search(problem.message) or REFUSED.search(problem.message):
+                return re.sub(r"e\+0?(\d+)", r"e\1", match[1].replace(", for none, nor between", " for none, or"))
         except (TypeError, ValueError, OverflowError):
             continue
     return ""
@@ -174,7 +179,11 @@ def examples(epilog: str) -> tuple[list[str], list[str]]:
 def markdown(words: str, command: Any) -> str:
     """Reference of a command as MyST Markdown."""
     lines, notes = examples(command.epilog or "")
-    parts = [marked(command.help or ""), _literal(synopsis(words, command), "text"), _literal("\n".join(lines), "console")]
+    parts = [
+        marked(command.help or ""),
+        _literal(synopsis(words, command), "text"),
+        _literal("\n".join(lines), "console"),
+    ]
     parts += [marked(note if note.endswith(".") else f"{note}.") for note in notes]
     ends = "[Exit status](/commands.md)"
     if named := functions(words):
@@ -183,8 +192,7 @@ def markdown(words: str, command: Any) -> str:
     parts.append(f"{ends}: as for every command.")
     parts.append(f"```{{program}} catseye {words}\n```")
     for title, kind in (("Arguments", "argument"), ("Options", "option")):
-        parameters = [each for each in command.params if each.param_type_name == kind]
-        if parameters:
+        if parameters := parameters_of(command, kind):
             parts.append(f"**{title}**")
             parts += [_option(each) for each in parameters]
     return "\n\n".join(parts)
