@@ -39,10 +39,11 @@ class BuildError(Exception):
 
 
 class Build(NamedTuple):
-    """Files of one build."""
+    """Files of one build, and the sources that they are made of."""
 
     wheel: Path
     source: Path
+    tree: Path
 
 
 def commit_time(commit: str = "HEAD") -> int:
@@ -86,14 +87,14 @@ def built_twice(commit: str, directory: Path) -> Build:
     """
     epoch = commit_time(commit)
     first, second = (exported(commit, directory / name / "tree") for name in ("first", "second-time-elsewhere"))
-    build = Build(*(built(first, directory / "dist", kind, epoch) for kind in ("wheel", "sdist")))
-    require_same(build.wheel, built(second, directory / "again", "wheel", epoch))
-    require_same(build.source, built(second, directory / "again", "sdist", epoch))
-    with tarfile.open(build.source) as archive:
+    wheel, source = (built(first, directory / "dist", kind, epoch) for kind in ("wheel", "sdist"))
+    require_same(wheel, built(second, directory / "again", "wheel", epoch))
+    require_same(source, built(second, directory / "again", "sdist", epoch))
+    with tarfile.open(source) as archive:
         archive.extractall(directory / "unpacked", filter="data")
     (tree,) = (directory / "unpacked").iterdir()
-    require_same(build.wheel, built(tree, directory / "from-source", "wheel", epoch))
-    return build
+    require_same(wheel, built(tree, directory / "from-source", "wheel", epoch))
+    return Build(wheel, source, first)
 
 
 def digest(path: Path) -> str:
@@ -133,7 +134,7 @@ def require_publishable(build: Build, version: str) -> list[str]:
     if extra := [name for name in inside if LACKING.search(name)]:
         raise BuildError(f"{build.source.name} has {', '.join(extra[:3])}")
     documentation = sum(page.file_size for page in pages)
-    packed_sizes = [path.stat().st_size / 1e6 for path in build]
+    packed_sizes = [path.stat().st_size / 1e6 for path in (build.wheel, build.source)]
     return [
         f"{build.wheel.name}: {len(names)} files, {packed_sizes[0]:.1f} MB, {size / 1e6:.1f} MB unpacked",
         f"documentation in it: {len(pages)} pages, {documentation / 1e6:.2f} MB",

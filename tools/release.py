@@ -53,10 +53,10 @@ def built_release(place: Path, version: str) -> Build:
         say(f"  {sentence}")
     dist = ROOT / "dist"
     dist.mkdir(exist_ok=True)
-    copies = Build(*(Path(shutil.copy2(path, dist)) for path in build))
-    for path in copies:
+    wheel, source = (Path(shutil.copy2(path, dist)) for path in (build.wheel, build.source))
+    for path in (wheel, source):
         say(f"  {digest(path)}  {path.relative_to(ROOT)}")
-    return copies
+    return Build(wheel, source, build.tree)
 
 
 def trials(options: argparse.Namespace, build: Build, place: Path, version: str) -> list[bool]:

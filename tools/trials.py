@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from builds import ROOT, USERS, Build, BuildError, requirements
+from builds import USERS, Build, BuildError, requirements
 
 OLDEST = (3, 11)
 NEWEST_TRIED = 20  # python3.N is looked for up to this N
@@ -145,17 +145,17 @@ class Trial:
             sizes[extra] = self.size_mb() - before
         return sizes
 
-    def run_tests(self, *, warnings: str | None = None, quick: tuple[str, ...] = QUICK) -> str:
-        """Last line of the quick tests, which import the installed catseye; BuildError with those that fail."""
+    def run_tests(self, sources: Path, *, warnings: str | None = None) -> str:
+        """Last line of the quick tests, which import the installed catseye; BuildError with those that fail.
+
+        sources    clean copy of what was built, whose tests run
+        warnings   action for all warnings; None: those of pyproject.toml
+        """
         tree = self.place / "tree"
+        tree.mkdir()
         for name in BESIDE:
-            source = ROOT / name
-            ignored = shutil.ignore_patterns("__pycache__", "_build", ".pytest_cache")
-            if source.is_dir():
-                shutil.copytree(source, tree / name, ignore=ignored)
-            else:
-                tree.mkdir(exist_ok=True)
-                shutil.copy2(source, tree / name)
+            copy = shutil.copytree if (sources / name).is_dir() else shutil.copy2
+            copy(sources / name, tree / name)
         tools = [str(each) for each in requirements(("dev",)) if each.name in TOOLS]
         self.install(*tools)
         place = Path(self.run("python", "-c", "import catseye; print(catseye.__file__)", where=tree).strip())
@@ -163,7 +163,7 @@ class Trial:
             raise BuildError(f"the tests would import {place}, not the wheel")
         left_out = [f"--ignore={name}" for name in LEFT_OUT]
         options = ["-n", "2", "--dist", "worksteal", "--tb=short", "-rfE", *(("-W", warnings) if warnings else ())]
-        said = self.run("python", "-m", "pytest", *options, *left_out, *quick, where=tree)
+        said = self.run("python", "-m", "pytest", *options, *left_out, *QUICK, where=tree)
         return said.strip().splitlines()[-1]
 
 
@@ -183,7 +183,7 @@ def tried(python: str, build: Build, place: Path, version: str, *, constraints: 
         sizes = trial.add_extras(build.wheel)
     say("  extras, in this order: " + ", ".join(f"{extra} {size:.0f} MB" for extra, size in sizes.items()))
     with timed("quick tests of the installed wheel"):
-        summary = trial.run_tests(warnings="default" if constraints else None)
+        summary = trial.run_tests(build.tree, warnings="default" if constraints else None)
     say(f"  {summary}")
     if constraints is None:
         with timed("source archive in its place, version, documentation, demo"):

@@ -75,7 +75,7 @@ def test_reduce_gives_one_object_on_stdout_and_nothing_on_stderr(reduced):
 
 def test_reduce_writes_every_file_and_leaves_no_neighbour(reduced):
     _, out = reduced
-    files = "coordinates.csv coordinates.json pose.json provenance.json ranges.csv report.html surface.csv"
+    files = "coordinates.csv coordinates.json pose.json provenance.json ranges.csv report.html results.fits surface.csv"
     assert sorted(path.name for path in out.iterdir()) == files.split()
     assert [path.name for path in out.parent.iterdir()] == ["out"]
 

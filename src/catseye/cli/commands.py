@@ -185,7 +185,8 @@ def reduce(
         return
     refuse_several(several, "nights")
     night = _reduced(campaign[0], out, air_model, quiet)
-    files = "report.html, ranges.csv, coordinates.csv, coordinates.json, surface.csv, pose.json, provenance.json"
+    tables = "ranges.csv, coordinates.csv, coordinates.json, surface.csv, pose.json, results.fits"
+    files = f"report.html, {tables}, provenance.json"
     _tell(night, f"{out}/: {files}", json=json, quiet=quiet, strict=strict)
 
 

@@ -44,7 +44,7 @@ def test_each_night_has_the_files_of_reduce(scene, reduced, tmp_path):
     alone = catseye.save(catseye.reduce(scene[0][1]), tmp_path / "alone")
     folder = reduced[1] / "night-01"
     assert sorted(path.name for path in folder.iterdir()) == sorted(path.name for path in alone.iterdir())
-    for name in ("coordinates.csv", "ranges.csv", "surface.csv", "pose.json", "coordinates.json"):
+    for name in ("coordinates.csv", "ranges.csv", "surface.csv", "pose.json", "coordinates.json", "results.fits"):
         assert (folder / name).read_bytes() == (alone / name).read_bytes()
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from catseye.aliases import Progress
 from catseye.gateways.epoch.objects import COVARIANCE, coordinates_object, matrix_file, pose_object, provenance_object
 from catseye.gateways.epoch.report import reduction_report
+from catseye.gateways.epoch.results_fits import RESULTS, results_fits
 from catseye.gateways.epoch.tables import coordinates_csv, ranges_csv, surface_csv
 from catseye.gateways.writers.matrix_fits import matrix_pages
 from catseye.gateways.writers.objects import json_page
@@ -36,7 +37,7 @@ def _covariance(reduction: Reduction) -> Iterator[bytes]:
 def write_reduction(reduction: Reduction, directory: Path, progress: Progress | None = None) -> None:
     """Write tables, JSON, report, and the provenance with their hashes."""
     when = datetime.now(UTC)
-    cached = cache(reduction.held)  # once, for covariance.fits and the page
+    cached = cache(reduction.held)  # once, for both FITS files and the page
 
     separate = matrix_file(reduction.coordinates.points) == COVARIANCE
     files: Files = {
@@ -45,6 +46,7 @@ def write_reduction(reduction: Reduction, directory: Path, progress: Progress | 
         "surface.csv": lambda: surface_csv(reduction),
         "coordinates.json": lambda: json_page(coordinates_object(reduction)),
         **({COVARIANCE: lambda: _covariance(cached())} if separate else {}),
+        RESULTS: lambda: results_fits(cached()),
         "pose.json": lambda: json_page(pose_object(reduction)),
         "report.html": lambda: report_page(reduction_report(cached(), when, progress)),
     }

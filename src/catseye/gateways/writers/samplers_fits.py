@@ -13,11 +13,12 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from catseye.constants import PPM
 from catseye.errors import InputError
 from catseye.gateways.writers.columns import Table
 from catseye.gateways.writers.objects import json_page
@@ -25,10 +26,12 @@ from catseye.gateways.writers.output import PROVENANCE, write_atomically
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD
 from catseye.version import __version__
 
+Source = TypeVar("Source")
 MARK = "CATSEYE"  # keyword of the version; identifies a file of catseye
 TIME = "MJD"
 SAMPLERS = "samplers.fits"
-UNITS = {"m", "mm", "um", "rad", "urad", "deg", "arcsec", "s", "Hz"}  # those of CSV columns that become TUNIT
+SUM = "ones' complement sum"  # comment of both checksums
+UNITS = {"m", "mm", "um", "mm2", "rad", "urad", "deg", "arcsec", "s", "Hz", "V"}  # of CSV columns that become TUNIT
 NOT_ASCII = {"°": " deg", "µ": "u", "″": " arcsec", "′": " arcmin", "·": "*", "–": "-", "−": "-", "±": "+-"}
 STANDARD = {"XTENSION", "BITPIX", "NAXIS", "NAXIS1", "NAXIS2", "PCOUNT", "GCOUNT", "TFIELDS", "END", "EXTNAME"}
 OURS = {"TIMESYS", "MJDREF", "ORIGIN", "FRAME", "PIVOT", "REMARK", "CHECKSUM", "DATASUM", MARK}
@@ -72,10 +75,15 @@ class SamplerTable:
     header: Mapping[str, str | int | float | bool] = field(default_factory=dict)
 
 
-def sampler_tables(tables: Mapping[str, SamplerTable]) -> bytes:
+def sampler_tables(
+    tables: Mapping[str, SamplerTable], *, header: Mapping[str, str | int | float | bool] | None = None
+) -> bytes:
     """FITS file of the tables, verified by astropy.
 
     tables   in order, by extension name
+    header   additional keywords of the primary header
+
+    The same tables give the same bytes: the file holds no time of writing.
 
     Raises InputError for names, units, lengths or values that FITS cannot hold.
 
@@ -90,14 +98,19 @@ def sampler_tables(tables: Mapping[str, SamplerTable]) -> bytes:
     pages = [fits.PrimaryHDU()]
     pages[0].header["ORIGIN"] = "catseye"
     pages[0].header[MARK] = (__version__, "version of catseye")
+    for key, value in (header or {}).items():
+        pages[0].header[key] = value
     for name, table in tables.items():
         if name != table.name:
             raise InputError(f"table {table.name!r} has the key {name!r} (expected its name)")
         pages.append(_page(table))
     stream = io.BytesIO()
     hdus = fits.HDUList(pages)
+    hdus.update_extend()
     hdus.verify("exception")
-    hdus.writeto(stream, checksum=True, output_verify="exception")
+    for page in pages:
+        page.add_checksum(when=SUM)  # without a comment of ours, astropy's is the time of writing
+    hdus.writeto(stream, output_verify="exception")
     return stream.getvalue()
 
 
@@ -162,12 +175,37 @@ def _of_csv(name: str, text: str, units: Mapping[str, str], where: tuple[str, st
             values: ArrayLike = np.array([float(cell) if cell else np.nan for cell in cells])
             unit = units[title] if units[title] in UNITS else ""
         except ValueError:
-            values, unit = np.array([_as_ascii(cell) for cell in cells]), ""
+            values, unit = np.array([ascii_text(cell) for cell in cells]), ""
         columns[title.upper()] = SamplerColumn(unit, values)
     return SamplerTable(name, columns, comment=f"as {name.lower()}.csv", frame=where[0], pivot=where[1])
 
 
-def _as_ascii(text: str) -> str:
+def of_table(name: str, table: Table[Source], source: Source, *, frame: str = "") -> SamplerTable:
+    """Table of a command with its numbers unrounded, columns under their names without unit.
+
+    name     of the extension
+    table    definition of the columns; a column `mjd_utc` becomes MJD, ppm a fraction
+    source   of the rows
+    frame    as in `SamplerTable`
+    """
+    columns, mjd = {}, None
+    for column in table.columns:
+        values = column.value(source)
+        if column.unit == "d":
+            mjd = np.asarray(values, dtype=float)
+            continue
+        array = np.asarray(values)
+        if array.dtype.kind == "U":
+            array = np.array([ascii_text(text).rstrip() for text in array.tolist()], dtype=str)
+        scale, unit = (PPM, "") if column.unit == "ppm" else (None, column.unit)
+        stored = array if scale is None else array * scale
+        comment = ascii_text(column.doc.replace("`", ""))
+        columns[column.label.upper()] = SamplerColumn(unit if unit in UNITS else "", stored, comment)
+    return SamplerTable(name, columns, mjd=mjd, comment=f"as {table.file}, unrounded", frame=frame)
+
+
+def ascii_text(text: str) -> str:
+    """Text with plain ASCII in place of the signs that FITS cannot hold."""
     for sign, plain in NOT_ASCII.items():
         text = text.replace(sign, plain)
     return text.encode("ascii", "replace").decode("ascii")
