@@ -131,7 +131,7 @@ class _Corrections(NamedTuple):
     "         catseye surface before.csv after.csv --zernike 21\n"
     "         catseye surface e10 e30 e50 e80 e50b e30b --actuators actuators.csv --out lookup\n"
     "One input: its shape; two: second less first as well; from three on: a look-up table by elevation. "
-    "Tables: docs/formats/surface.md"
+    "Tables: catseye help formats/surface"
 )
 @grouped
 def surface(  # noqa: PLR0913 - its options are its command line
