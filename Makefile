@@ -23,8 +23,8 @@ setup: $(STAMP)  ## make .venv and install catseye in it
 check: style types  ## style, types, layers
 
 style: setup
-	$(BIN)/ruff check src tests benchmarks studies
-	$(BIN)/ruff format --check src tests benchmarks studies
+	$(BIN)/ruff check src tests benchmarks studies docs
+	$(BIN)/ruff format --check src tests benchmarks studies docs
 	$(BIN)/lint-imports
 
 types: setup

@@ -92,6 +92,8 @@ FACE = {  # file of catseye.api -> its exported names
     "weather": ("air", "sound"),
 }
 
+RENAMED: dict[str, tuple[str, str]] = {}  # former name -> name, version without the former: docs/people/stable.md
+
 __all__ = [
     "ArgumentError",
     "CatseyeError",
@@ -161,6 +163,12 @@ __all__ = [
 if not TYPE_CHECKING:  # else mypy would accept every name
 
     def __getattr__(name: str) -> Any:
+        if name in RENAMED:
+            from catseye.deprecation import warn_deprecated
+
+            replacement, removal = RENAMED[name]
+            warn_deprecated(f"catseye.{name}", f"catseye.{replacement}", removal)
+            name = replacement
         for file, names in FACE.items():
             if name in names:
                 value = globals()[name] = getattr(import_module(f"catseye.api.{file}"), name)

@@ -1,3 +1,3 @@
 """Version, in a module that every layer may import."""
 
-__version__ = "0.2.0"
+__version__ = "0.9.0"

@@ -1,8 +1,7 @@
-"""Inputs of all commands: paths that may be examples, and words that a shell completes."""
+"""Inputs of all commands: paths that may be examples, and their completion in a shell."""
 
 import functools
 import inspect
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, get_args
@@ -10,6 +9,7 @@ from typing import Any, get_args
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
+from catseye.cli.completion import complete
 from catseye.cli.terminal import by_options, for_programs
 from catseye.errors import ArgumentError
 
@@ -21,7 +21,7 @@ OUTPUTS = frozenset({"earlier", "epoch", "inputs", "sources"})  # read, and writ
 
 
 def prepare(app: typer.Typer) -> None:
-    """Let every command of an app take examples by name where it reads a path, and complete the words of its options.
+    """Let every command of an app take examples by name where it reads a path, and complete their words.
 
     A second call changes nothing.
     """
@@ -31,7 +31,7 @@ def prepare(app: typer.Typer) -> None:
             if callback is None or hasattr(callback, "__prepared__"):
                 continue
             for parameter in inspect.signature(callback).parameters.values():
-                _complete(parameter)
+                complete(command.name or callback.__name__.rstrip("_"), parameter)
             command.callback = _with_examples(callback)
 
 
@@ -80,20 +80,3 @@ def spelled(callback: Callable[..., Any]) -> dict[str, str]:
                 options = [each.split("/")[0] for each in spellings if each.startswith("--")]
                 names |= {name: options[0]} if options else {}
     return names
-
-
-def _complete(parameter: inspect.Parameter) -> None:
-    """Give an option with a list of words a completion of these."""
-    for info in get_args(parameter.annotation)[1:]:
-        words = str(getattr(info, "metavar", None) or "").split("|")
-        if len(words) > 1 and info.autocompletion is None and all(re.fullmatch(r"[a-z][\w-]*", w) for w in words):
-            info.autocompletion = _beginning_of(words)
-
-
-def _beginning_of(words: list[str]) -> Callable[[str], list[str]]:
-    """A completion: those of the words that begin as what was typed."""
-
-    def beginning(incomplete: str) -> list[str]:
-        return [word for word in words if word.startswith(incomplete)]
-
-    return beginning

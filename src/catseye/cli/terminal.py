@@ -105,7 +105,9 @@ def complain(text: str) -> None:
 def wrapped(title: str, text: str) -> str:
     """A paragraph under its title, indented, for a terminal."""
     width = WIDTH if not sys.stdout or not sys.stdout.isatty() else min(WIDTH, os.get_terminal_size().columns)
-    return textwrap.fill(text, max(width, 40), initial_indent=f"{title:<13} ", subsequent_indent=" " * 14)
+    return textwrap.fill(
+        text, max(width, 40), break_on_hyphens=False, initial_indent=f"{title:<13} ", subsequent_indent=" " * 14
+    )
 
 
 @contextmanager

@@ -63,4 +63,5 @@ def one_of(words: str) -> Callable[[str | None], str | None]:
             raise typer.BadParameter(f"{value!r} is not one of {words.replace('|', ', ')}.")
         return value
 
+    check.words = tuple(words.split("|"))  # type: ignore[attr-defined] # for completion and the reference
     return check
