@@ -112,6 +112,11 @@ def test_the_title_is_the_first_heading_outside_code():
     ("page", "text"),
     [
         ("```{command-file} a.csv\nx,y\n```\n", "File `a.csv`:\n\n```text\nx,y\n```\n"),
+        ("```{command}\n:hide:\ncatseye air\n```\nWords.\n", "Words.\n"),
+        (
+            ":::{grid-item-card} Tour\n:link: tour/index\n:link-type: doc\n\nPages.\n:::\n",
+            "**Tour** (`catseye help tour`)\n\nPages.\n",
+        ),
         ("```{command-reference} air\n```\n", "Options: `catseye air --help`\n"),
         ("```{public} air sound\n```\n", "In Python: `help(catseye.air)`, `help(catseye.sound)`\n"),
         ("```{formulas} catseye.signal.drift\n```\n", "In Python: `help('catseye.signal.drift')`\n"),

@@ -118,7 +118,9 @@ def _rendered(directive: Directive) -> list[str]:
         if kind in kinds:
             return render(directive)
     if kind.startswith(("grid", "tab-", "card", "dropdown")) or kind in ("div", "container", "margin", "topic"):
-        title = [f"**{directive.argument}**", ""] if re.search(r"[A-Za-z]", directive.argument) else []
+        page = directive.options.get("link", "").removesuffix("/index")
+        there = f" (`catseye help {page}`)" if page and directive.options.get("link-type") == "doc" else ""
+        title = [f"**{directive.argument}**{there}", ""] if re.search(r"[A-Za-z]", directive.argument) else []
         return ["", *title, *_lines(directive.body), ""]
     return ["", f"{BUILT}: {f'{kind} {directive.argument}'.strip()})*", ""]
 
@@ -130,6 +132,8 @@ def _code(directive: Directive) -> list[str]:
 
 def _command(directive: Directive) -> list[str]:
     """Command lines with their prompt; a line that a backslash continues has none."""
+    if "hide" in directive.options:
+        return []
     lines: list[str] = []
     for line in _trimmed(directive.body):
         lines.append(f"  {line}" if lines and lines[-1].endswith("\\") else f"$ {line}")
