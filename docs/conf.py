@@ -28,7 +28,7 @@ extensions = [
 exclude_patterns = ["_build", "_templates", "extensions"]
 templates_path = ["_templates"]
 default_role = "code"
-language = "en_GB"
+language = "en"
 highlight_language = "text"
 nitpicky = True
 nitpick_ignore_regex = [
@@ -66,6 +66,7 @@ html_css_files = ["catseye.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False  # would be fetched, which a browser refuses where pages are opened from disk
+html_context = {"default_mode": "auto"}
 html_theme_options = {
     "logo": {"image_light": "_static/logo.svg", "image_dark": "_static/logo-dark.svg", "alt_text": "catseye"},
     "icon_links": [],
