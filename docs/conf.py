@@ -63,6 +63,7 @@ html_title = f"catseye {release}"
 html_favicon = "_static/icon.svg"
 html_static_path = ["_static"]
 html_css_files = ["catseye.css"]
+html_js_files = ["catseye.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False  # would be fetched, which a browser refuses where pages are opened from disk
