@@ -16,6 +16,7 @@ version = release = __version__
 
 extensions = [
     "command_line",
+    "commands",
     "docstrings",
     "myst_nb",
     "python_reference",
