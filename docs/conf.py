@@ -18,6 +18,7 @@ extensions = [
     "command_line",
     "commands",
     "docstrings",
+    "drawings",
     "myst_nb",
     "python_reference",
     "references",
