@@ -16,6 +16,7 @@ version = release = __version__
 
 extensions = [
     "command_line",
+    "gallery",
     "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
