@@ -9,7 +9,8 @@
 
 The argument is a Python call of one result of catseye. Each line names a figure of `catseye.show` and says what it
 shows. `:as: night` keeps the result for later calls. `:command:` is the same on the command line. Simulated inputs
-that no bundled example has are `years`, `dishes`, `vibrating`, `epochs`, `moved` and `bending`; see `GalleryCalls`.
+that no bundled example has are `years`, `dishes`, `vibrating`, `epochs`, `moved`, `bending`,
+`first_night` and `todays_site`; see `GalleryCalls`.
 """
 
 import json
@@ -28,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```\{gallery\} (?P<call>.+)\n(?P<body>(?:.*\n)*?)```$", re.MULTILINE)
 OPTION = re.compile(r"^:(?P<name>[a-z]+): (?P<value>.+)$")
 NIGHTS, POINTS = 45, 9  # of the simulated archive
-SCENES = ("years", "dishes", "vibrating", "epochs", "moved", "bending")
+SCENES = ("years", "dishes", "vibrating", "epochs", "moved", "bending", "first_night", "todays_site")
 
 
 @dataclass(frozen=True)
@@ -127,13 +128,38 @@ class GalleryCalls:
 
     @cached_property
     def dishes(self) -> Path:
-        """Archive of two nights with prisms on the dish."""
+        """Archive of four nights of one telescope, with prisms on the dish."""
         import catseye
 
         place = Path(self._place.name)
-        tonight = catseye.night(place / "tonight", seed=7, dish_prisms=40, again=0.0)
-        catseye.archive(place / "dishes", ["night-01", tonight], processes=1)
+        nights = [
+            catseye.night(place / f"night-{k}", seed=7, dish_prisms=40, again=0.0, elevation_deg=elevation)
+            for k, elevation in enumerate((20.0, 40.0, 60.0, 80.0))
+        ]
+        catseye.archive(place / "dishes", nights, processes=1)
         return place / "dishes"
+
+    @cached_property
+    def first_night(self) -> str:
+        """Identifier of the first night of `dishes`."""
+        import catseye
+
+        return str(catseye.query(self.dishes).to_table()["night"][0])
+
+    @cached_property
+    def todays_site(self) -> Path:
+        """Records of `dishes` with another D0 of one ranger on the feed arm, by 0.2 mm."""
+        import shutil
+
+        where, before = Path(self._place.name) / "today", self.dishes.parent / "night-0"
+        shutil.copytree(before, where)
+        mirror = where / "mirrors" / "ZP113.toml"
+        lines = mirror.read_text(encoding="utf-8").splitlines()
+        for k, line in enumerate(lines):
+            if line.startswith("d0_mm"):
+                lines[k] = f"d0_mm = {float(line.partition('=')[2]) + 0.2:.3f}"
+        mirror.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return where
 
     @cached_property
     def epochs(self) -> Path:
@@ -196,14 +222,14 @@ class GalleryCalls:
 
     @cached_property
     def bending(self) -> dict[str, Any]:
-        """Arguments of `catseye.surface`: 200 prisms at seven elevations, with astigmatism that goes as its cosine."""
+        """Arguments of `catseye.surface`: 200 prisms at seven elevations, with a trefoil that goes as its cosine."""
         import numpy as np
 
         rng = np.random.default_rng(4)
         radius, angle = 48 * np.sqrt((np.arange(200) + 0.5) / 200), np.arange(200) * np.pi * (3 - 5**0.5)
         x, y = radius * np.cos(angle), 54 + radius * np.sin(angle)
-        elevation = np.linspace(10, 80, 7)
-        bend = 4e-4 * (radius / 50) ** 2 * np.cos(2 * angle) * np.cos(np.radians(elevation))[:, None]
+        elevation = np.linspace(80, 10, 7)
+        bend = 4e-4 * (radius / 50) ** 3 * np.cos(3 * angle) * np.cos(np.radians(elevation))[:, None]
         z = (x**2 + y**2) / 240 + bend + 5e-5 * rng.standard_normal((7, 200))
         places = np.stack([np.broadcast_to(x, z.shape), np.broadcast_to(y, z.shape), z], axis=2)
         return {"points": places, "u": 5e-5, "elevation_deg": elevation}
