@@ -19,6 +19,7 @@ extensions = [
     "commands",
     "docstrings",
     "drawings",
+    "gallery",
     "myst_nb",
     "python_reference",
     "references",
