@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from catseye.api.pointing import fit_pointing, predict_pointing
     from catseye.api.pose import pose
     from catseye.api.positions import locate
-    from catseye.api.reading import examples, load
+    from catseye.api.reading import examples, load, topic, topics
     from catseye.api.result import save, show
     from catseye.api.scale.archive import archive, restore
     from catseye.api.scale.design import design
@@ -77,7 +77,7 @@ FACE = {  # file of catseye.api -> its exported names
     "pointing": ("fit_pointing", "predict_pointing"),
     "pose": ("pose",),
     "positions": ("locate",),
-    "reading": ("examples", "load"),
+    "reading": ("examples", "load", "topic", "topics"),
     "result": ("save", "show"),
     "scale.archive": ("archive", "restore"),
     "scale.design": ("design",),
@@ -91,6 +91,8 @@ FACE = {  # file of catseye.api -> its exported names
     "track_profile": ("track_pointing",),
     "weather": ("air", "sound"),
 }
+
+RENAMED: dict[str, tuple[str, str]] = {}  # former name -> name, version without the former: docs/people/stable.md
 
 __all__ = [
     "ArgumentError",
@@ -151,6 +153,8 @@ __all__ = [
     "sound",
     "structure",
     "surface",
+    "topic",
+    "topics",
     "track",
     "track_pointing",
     "trends",
@@ -161,6 +165,12 @@ __all__ = [
 if not TYPE_CHECKING:  # else mypy would accept every name
 
     def __getattr__(name: str) -> Any:
+        if name in RENAMED:
+            from catseye.deprecation import warn_deprecated
+
+            replacement, removal = RENAMED[name]
+            warn_deprecated(f"catseye.{name}", f"catseye.{replacement}", removal)
+            name = replacement
         for file, names in FACE.items():
             if name in names:
                 value = globals()[name] = getattr(import_module(f"catseye.api.{file}"), name)
