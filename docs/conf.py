@@ -16,18 +16,33 @@ version = release = __version__
 
 extensions = [
     "command_line",
+    "commands",
+    "docstrings",
     "myst_nb",
+    "python_reference",
+    "references",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["_build", "extensions", "README.md"]
-templates_path = []
+exclude_patterns = ["_build", "_templates", "extensions"]
+templates_path = ["_templates"]
 default_role = "code"
 language = "en_GB"
 highlight_language = "text"
-nitpicky = False
+nitpicky = True
+nitpick_ignore_regex = [
+    ("py:obj", ".*"),  # code in a docstring is a link where it names something, and code where it does not
+    ("py:.*", r"(?!catseye\.).*"),  # of other packages: no page here
+]
+
+autodoc_default_options = {"member-order": "bysource"}
+autodoc_typehints = "none"
+python_maximum_signature_line_length = 88
+python_use_unqualified_type_names = True
+add_module_names = False
+toc_object_entries_show_parents = "hide"
 
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath", "fieldlist"]
 myst_heading_anchors = 4
@@ -40,11 +55,34 @@ nb_merge_streams = True
 mathjax_path = "mathjax/tex-svg.js"
 mathjax3_config = {"options": {"enableMenu": False}, "loader": {"load": []}}
 
-copybutton_prompt_text = "$ "
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
 copybutton_line_continuation_character = "\\"
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"catseye {release}"
+html_favicon = "_static/icon.svg"
 html_static_path = ["_static"]
+html_css_files = ["catseye.css"]
+html_copy_source = False
 html_show_sourcelink = False
-html_theme_options = {"icon_links": [], "show_nav_level": 2, "navigation_with_keys": False}
+html_show_search_summary = False  # would be fetched, which a browser refuses where pages are opened from disk
+html_theme_options = {
+    "logo": {"image_light": "_static/logo.svg", "image_dark": "_static/logo-dark.svg", "alt_text": "catseye"},
+    "icon_links": [],
+    "show_nav_level": 1,
+    "navigation_depth": 3,
+    "navigation_with_keys": False,
+    "search_bar_text": "Search",
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["footer-version"],
+    "footer_end": [],
+}
+html_sidebars = {"index": []}
+
+
+def setup(app):
+    """Know the names of plain texts that Pygments does not colour."""
+    from pygments.lexers.special import TextLexer
+
+    app.add_lexer("csv", TextLexer)

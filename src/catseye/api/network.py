@@ -282,7 +282,7 @@ def adjust(
     level        of the tests, of all single ones together
     iterations   cap of the Gauss-Newton steps of every solution, 1 or more; None: 50
     relative     pairs of points whose relative ellipsoid is wanted
-    sigma_mm, sigma_ppm   standard uncertainty of a range of ranges.csv that has none: a + b D, in quadrature
+    sigma_mm, sigma_ppm   standard uncertainty of a range of ranges.csv that has none: a + b D
     progress     called with (what, done, of how many)
 
     A network without an answer is a result, too: its verdict is "failed", `status` says why and what to do, and

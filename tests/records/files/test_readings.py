@@ -96,6 +96,10 @@ def test_a_bad_table_is_refused_in_one_line(files, table, said):
             ('kind = "thing"', 'kind = "leakage"'),
             "kind = 'leakage' is the sheet of another calibration (expected 'thing')",
         ),
+        (
+            ('kind = "thing"', 'kind = "leakage"\nu_session_volt = 0.1'),
+            "kind = 'leakage' is the sheet of another calibration (expected 'thing')",
+        ),
         (("2027-09-01", "2026-09-01"), "valid_until = 2026-09-01 is not after measured_on = 2026-09-01"),
         (('report = "L1"', 'report = "L1"\nlevel = 0.95'), "level = 0.95 is not a small probability"),
         (('report = "L1"', 'report = "L1"\nlevl = 0.05'), "levl = 0.05 is not a known key (expected perhaps level)"),

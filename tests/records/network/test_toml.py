@@ -99,7 +99,7 @@ def test_a_table_beside_the_file_is_read_by_its_lines(tmp_path):
     (tmp_path / "r.csv").write_text("from,to,value_m,u_mm\nA,B,10.001,\nA,C,9.999,0.2\n")
     with pytest.raises(InputError) as refusal:
         read(tmp_path, '[[observations]]\nkind = "slope_distance"\nfile = "r.csv"')
-    assert str(refusal.value) == "r.csv: r.csv line 2, u is missing (expected u_m, u_mm, u_um)"
+    assert str(refusal.value) == "r.csv: line 2, u is missing (expected u_m, u_mm, u_um)"
     (tmp_path / "r.csv").write_text("from,to,value_m\nA,B,10.001\nA,C,9.999\n")
     network = read(tmp_path, '[[observations]]\nkind = "slope_distance"\nfile = "r.csv"\nu_mm = 0.2')
     assert network.groups[0].observed.tolist() == [10.001, 9.999]

@@ -17,7 +17,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from catseye.errors import InputError
 from catseye.records.files.columns import TextColumns, columns_of
-from catseye.records.files.reading import Folder, column
+from catseye.records.files.reading import Folder, column, toml_of
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Name, Record, Version, Within, broken_rule
 from catseye.records.files.refusal import other_unit, refusal
 
@@ -31,13 +31,14 @@ TEXT = None  # limits of a text column
 class Sheet(Record):
     """Sheet common to all calibrations.
 
-    kind                     kind of calibration, by its name in the command
-    instrument               calibrated instrument: "ZP103", "EDM 7"
-    serial                   serial number
-    measured_on, valid_until dates
-    by                       person who measured
-    report                   reference to the report
-    level                    of the tests: probability of any false alarm among the readings
+    kind          kind of calibration, by its name in the command
+    instrument    calibrated instrument: "ZP103", "EDM 7"
+    serial        serial number
+    measured_on   day of the readings
+    valid_until   last day of validity, after measured_on
+    by            person who measured
+    report        reference to the report
+    level         of the tests: probability of any false alarm among the readings
     """
 
     format: Annotated[int | str, Version("readings")] = 1
@@ -152,11 +153,12 @@ def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | Non
     if sheet_path.resolve() == path.resolve():
         raise refusal(path.name, "is given as the table and as its sheet (expected a table .csv and a sheet .toml)")
     page = Folder(sheet_path.parent)
-    record = page.record(sheet_path.name, layout.sheet)
-    if record.kind != layout.kind:
+    kind = toml_of(page.text(sheet_path.name), sheet_path.name).get("kind")
+    if isinstance(kind, str) and kind != layout.kind:  # before its keys, which are another kind's
         raise refusal(
-            sheet_path.name, f"kind = {record.kind!r} is the sheet of another calibration (expected {layout.kind!r})"
+            sheet_path.name, f"kind = {kind!r} is the sheet of another calibration (expected {layout.kind!r})"
         )
+    record = page.record(sheet_path.name, layout.sheet)
     folder = Folder(path.parent)
     text = folder.text(path.name)
     optional = {**layout.optional, TIME: Within(EARLIEST_MJD, LATEST_MJD), LEFT_OUT: TEXT}

@@ -47,7 +47,8 @@ class Fields:
     requested: set[str] = field(default_factory=set)
 
     def refuse(self, problem: str) -> InputError:
-        return refusal(self.file, f"{self.place}, {problem}")
+        place = self.place.removeprefix(f"{self.file} ")  # rows of a table that a TOML file names
+        return refusal(self.file, f"{place}, {problem}")
 
     def has(self, key: str) -> bool:
         self.requested.add(key)

@@ -240,7 +240,7 @@ def _taken(search: PlacingSearch, frame: PlacingSearch, xyz: np.ndarray) -> str:
     Returns the reason of failure, or "".
     """
     search.sides |= frame.sides & set(search.unplaced.tolist())
-    return "" if search.fill(xyz) else "nothing new"
+    return "" if search.fill(xyz) else "the other ranges do not place it"
 
 
 def _misfit_of_heights(r: Sightings, xyz: np.ndarray) -> float:
