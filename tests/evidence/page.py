@@ -7,9 +7,16 @@ from repository import ROOT
 PAGE = ROOT / "docs" / "evidence" / "how-good.md"
 DATA = ROOT / "docs" / "evidence" / "how-good.json"
 TITLES = {
-    "ground": "ground rangers", "arm": "feed arm", "ball": "balls", "triplet prism": "triplet prisms", "dish": "dish prisms",
-    "struct": "structure", "surface": "surface", "pose": "pose", "thermometers": "thermometers",
-}  # fmt: skip
+    "ground": "ground rangers",
+    "arm": "feed arm",
+    "ball": "balls",
+    "triplet prism": "triplet prisms",
+    "dish": "dish prisms",
+    "struct": "structure",
+    "surface": "surface",
+    "pose": "pose",
+    "thermometers": "thermometers",
+}
 
 
 def table(head, rows):
@@ -21,8 +28,8 @@ def run_text(data):
     """Sentence about the run."""
     run = data["run"]
     return (
-        f"Run of {run['date']} by catseye {run['version']} ({run['revision']}) on {run['processor']}, {run['cores']} cores, "
-        f"Python {run['python']}, numpy {run['numpy']}: {run['processor_s'] / 60:.1f} minutes of processor time."
+        f"Run of {run['date']} by catseye {run['version']} ({run['revision']}) on {run['processor']}, "
+        f"{run['cores']} cores, Python {run['python']}, numpy {run['numpy']}: {run['processor_s'] / 60:.1f} minutes of processor time."
     )
 
 
@@ -48,16 +55,15 @@ def nights_text(data):
 def records_text(data):
     """Table of wrong records."""
     head = ["wrong record", "named", "covered", "noticed", "silent", "mean square", "largest shift"]
-    rows = [
-        [
-            r["record"],
-            *(str(r[key]) for key in head[1:5]),
-            f"{r['mean_square']:.1f}",
-            f"{1e3 * r['largest_shift_m']:.2f} mm",
-        ]
-        for r in data["wrong_records"]
-    ]
-    return table(head, rows)
+    rows = []
+    for r in data["wrong_records"]:
+        sizes = ["no result", ""]
+        if r["mean_square"] is not None:
+            sizes = [f"{r['mean_square']:.1f}", f"{1e3 * r['largest_shift_m']:.2f} mm"]
+        rows.append([r["record"], *(str(r[key]) for key in head[1:5]), *sizes])
+    nights = sum(data["wrong_records"][0][key] for key in head[1:5])
+    refused = sum(r["refused"] for r in data["wrong_records"])
+    return f"{table(head, rows)}\n\n{nights} nights of 60 prisms for each record; {refused} of them were refused."
 
 
 def networks_text(data):

@@ -6,6 +6,7 @@ import re
 import numpy as np
 from scipy.stats import chi2
 
+from catseye.errors import EstimationError, InputError
 from catseye.records.night.campaign import read_campaign
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.simulator.night.sheets import write_night
@@ -93,9 +94,15 @@ def night_of(seed, directory):
 
 
 def outcome(name, truth, campaign, usual):
-    """Outcome of one wrong record: one of OUTCOMES, mean squared normalised error, largest shift of a coordinate, m."""
+    """Outcome of one wrong record: one of OUTCOMES, mean squared normalised error, largest shift of a coordinate, m.
+
+    A night that is refused has no errors: both are nan.
+    """
     change, pattern = CASES[name]
-    reduction = reduce_epoch(change(campaign))
+    try:
+        reduction = reduce_epoch(change(campaign))
+    except (InputError, EstimationError) as refusal:
+        return (NAMED if re.search(pattern, str(refusal)) else NOTICED), np.nan, np.nan
     coordinates = reduction.coordinates
     points = [n for n in coordinates.points if n in coordinates.places and n in truth.points]
     errors = [coordinates.x[coordinates.index(n)] - truth.points[n] for n in points]
@@ -112,6 +119,12 @@ def outcome(name, truth, campaign, usual):
     return (NOTICED if said or verdict.word != "good" else SILENT), mean, largest
 
 
+def median(values):
+    """Median of the values that are numbers; None where none is."""
+    numbers = [value for value in values if np.isfinite(value)]
+    return float(np.median(numbers)) if numbers else None
+
+
 def measured(count, directory, say):
     """A row for each wrong record: how many of so many nights had which outcome."""
     found = {name: [] for name in CASES}
@@ -125,8 +138,9 @@ def measured(count, directory, say):
         {
             "record": name,
             **{key: sum(each[0] == key for each in outcomes) for key in OUTCOMES},
-            "mean_square": float(np.median([each[1] for each in outcomes])),
-            "largest_shift_m": float(np.median([each[2] for each in outcomes])),
+            "refused": sum(bool(np.isnan(each[1])) for each in outcomes),
+            "mean_square": median([each[1] for each in outcomes]),
+            "largest_shift_m": median([each[2] for each in outcomes]),
             "first_night": outcomes[0][0],
         }
         for name, outcomes in found.items()
