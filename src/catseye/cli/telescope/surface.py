@@ -181,7 +181,7 @@ class _Corrections(NamedTuple):
     "         catseye surface points.csv --focal-length-m 9 --diameter-m 25 --frequency-ghz 86\n"
     "         catseye surface e10 e30 e50 e80 e50b e30b --actuators actuators.csv --out lookup\n"
     "One input: its shape; two: second less first as well; from three on: a look-up table by elevation. "
-    "Tables: docs/formats/surface.md"
+    "Tables: catseye help formats/surface"
 )
 @grouped
 def surface(  # noqa: PLR0913 - its options are its command line
