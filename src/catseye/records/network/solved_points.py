@@ -11,6 +11,7 @@ import numpy as np
 
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.records.files.covariance_file import part_of, stored_covariance
+from catseye.records.files.examples import name_of
 from catseye.records.files.point_table import read_point_table
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
@@ -136,7 +137,7 @@ def read_points(path: Path | str, *, u: float | None = None) -> SolvedPoints:
     table = read_point_table(folder.text(path.name), path.name, u=u)
     exact = np.zeros((len(table.names), 3, 3))
     return SolvedPoints(
-        file=str(path),
+        file=name_of(path),
         campaign=path.stem,
         names=table.names,
         x=table.x,

@@ -12,6 +12,7 @@ from catseye.estimation.least_squares.covariance import Dense, JointPoints
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.records.files.columns import TextColumns, columns_of
+from catseye.records.files.examples import name_of
 from catseye.records.files.point_table import read_point_table, refuse_far, require_uncertainty
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
@@ -127,7 +128,7 @@ def _reduced(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms,
         points=solved.places(solved.dish),
         covariance=JointPoints(Dense(block), np.arange(len(block)).reshape(-1, 3)),
         nominal=_frame(site, azimuth, elevation),
-        source=str(source),
+        source=name_of(source),
         elevation_deg=elevation,
         azimuth_deg=azimuth,
         temperature_c=place.temperature_c,
@@ -156,7 +157,7 @@ def _table(source: Path, dish: DishDesign, place: EpochPlace) -> tuple[Prisms, d
         points=points,
         covariance=covariance,
         nominal=_nominal(source.name, dish, place),
-        source=str(source),
+        source=name_of(source),
         elevation_deg=place.elevation_deg,
         azimuth_deg=place.azimuth_deg,
         temperature_c=place.temperature_c,
