@@ -16,7 +16,7 @@ from catseye.records.site.folder import read_site, site_files
 from catseye.reduction.site.places import places_of
 from repository import ROOT
 
-SITES = ROOT / "examples" / "sites"
+SITES = examples.examples_directory() / "sites"  # of the package, where it is installed
 TARGETS_OF_NIGHT = {"ZEG41040L", "ZEG20440L", "ZAG731P", "ZAG731D", *(f"ZBM{n:02d}" for n in range(1, 7))}
 FOCAL_LENGTH_MM, APERTURE_MM, RIM_MM = 60_000.0, 54_000.0, 50_000.0  # 100 m that begin 4 m from the vertex
 ROUNDING_MM = 0.001  # of each coordinate as written
