@@ -261,7 +261,12 @@ def surface(
     if dish.site is None:
         _refuse_of_site(frame=frame != "reflector", azimuth_deg=azimuth_deg is not None, actuators=actuators)
     placed = _Placed(
-        dish, frame, azimuth_deg, _row(elevation_deg), _row(temperature_c), None if u_mm is None else u_mm * MILLIMETRE
+        dish=dish,
+        frame=frame,
+        azimuth_deg=azimuth_deg,
+        elevation_deg=_row(elevation_deg),
+        temperature_c=_row(temperature_c),
+        u=None if u_mm is None else u_mm * MILLIMETRE,
     )
     if points is None:
         prisms, hashes, sources = _of_inputs(inputs, placed)

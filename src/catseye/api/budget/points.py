@@ -41,41 +41,41 @@ class BudgetResult(Result):
     kinds: tuple[str, ...]
     contribution: np.ndarray
     share: np.ndarray
-    found: "PointBudget"
+    parts: "PointBudget"
     campaign: "Campaign"
 
     def passages(self) -> "Sequence[Passage]":
         """Sentence a point: its uncertainty, and the largest input of each axis."""
         from catseye.gateways.epoch.budget import budget_passages
 
-        return budget_passages(self.found)
+        return budget_passages(self.parts)
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye budget --json`."""
         from catseye.gateways.epoch.budget import budget_object
 
-        return budget_object(self.found)
+        return budget_object(self.parts)
 
     def tables(self) -> "dict[str, QTable]":
         """`budget`: a row a point and kind of input."""
         n, s = len(self.points), len(self.kinds)
-        each = {"point": (np.repeat(self.points, s), ""), "input": (np.tile(self.kinds, n), "")}
+        columns = {"point": (np.repeat(self.points, s), ""), "input": (np.tile(self.kinds, n), "")}
         for axis, name in enumerate(("x", "y", "z")):
-            each[f"contribution_{name}"] = (1e6 * self.contribution[:, :, axis].T.ravel(), "um")
-            each[f"share_{name}"] = (100.0 * self.share[:, :, axis].T.ravel(), "%")
-        return {"budget": quantities(each)}
+            columns[f"contribution_{name}"] = (1e6 * self.contribution[:, :, axis].T.ravel(), "um")
+            columns[f"share_{name}"] = (100.0 * self.share[:, :, axis].T.ravel(), "%")
+        return {"budget": quantities(columns)}
 
     def figures(self) -> "dict[str, Figure]":
         """Contributions of the inputs, by axis."""
         from catseye.gateways.epoch.budget import budget_figure
 
-        return {"contributions": budget_figure(self.found)}
+        return {"contributions": budget_figure(self.parts)}
 
     def rows(self) -> list[str]:
         """Table a point for a terminal."""
         from catseye.gateways.epoch.budget import point_budget_lines
 
-        return point_budget_lines(self.found)
+        return point_budget_lines(self.parts)
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of the campaign's files."""
@@ -111,15 +111,15 @@ def budget(
     if not names:
         raise ArgumentError("points is empty (expected names of points of the night)", "points")
     night = campaign_of(campaign)
-    found = budget_of_points(night, names, ReductionSettings(air_model=air_model), progress)
+    parts = budget_of_points(night, names, ReductionSettings(air_model=air_model), progress)
     return BudgetResult(
-        verdict=found.verdict,
-        points=found.points,
-        x=found.x,
-        u=found.u,
-        kinds=found.budget.sources,
-        contribution=found.contribution,
-        share=found.share,
-        found=found,
+        verdict=parts.verdict,
+        points=parts.points,
+        x=parts.x,
+        u=parts.u,
+        kinds=parts.budget.sources,
+        contribution=parts.contribution,
+        share=parts.share,
+        parts=parts,
         campaign=night,
     )

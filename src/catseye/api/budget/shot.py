@@ -158,16 +158,16 @@ def explain(
         )
     if seed < 0:
         raise ArgumentError(f"seed = {seed} (expected 0 or more)", "seed")
-    found = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
+    explanation = explain_shot(night, shot, settings=settings, draws=monte_carlo, seed=seed, progress=progress)
     return ExplanationResult(
-        verdict=found.verdict,
-        shot=found.shot,
-        ranger=found.ranger,
-        target=found.target,
-        status=str(found.status),
-        range_=found.budget.value if found.budget is not None else None,
-        u_range=found.budget.u if found.budget is not None else None,
-        explanation=found,
+        verdict=explanation.verdict,
+        shot=explanation.shot,
+        ranger=explanation.ranger,
+        target=explanation.target,
+        status=str(explanation.status),
+        range_=explanation.budget.value if explanation.budget is not None else None,
+        u_range=explanation.budget.u if explanation.budget is not None else None,
+        explanation=explanation,
         campaign=night,
         seed=seed if monte_carlo else None,
     )
