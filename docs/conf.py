@@ -19,6 +19,7 @@ extensions = [
     "commands",
     "docstrings",
     "drawings",
+    "glossary",
     "myst_nb",
     "python_reference",
     "references",
