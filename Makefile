@@ -60,9 +60,9 @@ front-check: front/node_modules  # types, and the committed files against a new 
 	diff -r front/built/web src/catseye/web/static
 	diff -r front/built/report src/catseye/gateways/writers/static
 
-docs: setup  ## the documentation in docs/_build/html: strict, every cell executed, opens from disk
+docs: setup  ## the documentation in docs/_build/html: strict, every command executed, links and words checked, opens from disk
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --jobs 2 -b html docs docs/_build/html
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/docs/make_docs.py docs docs/_build
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01

@@ -138,7 +138,7 @@ Job = Annotated[
 )
 def catseye(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Laser metrology for large telescopes and structures: raw samples to coordinates, with uncertainty."""
