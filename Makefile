@@ -7,7 +7,7 @@ STAMP := .venv/.catseye-installed
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(1 + (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()))')
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: help setup check style types test tests test-all test-web front front-check docs demo evidence bench bench-guard release clean
+.PHONY: help setup check style types test tests test-all test-web front front-check docs demo evidence bench bench-guard release lower-bounds clean
 
 help:  ## list the verbs
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -23,8 +23,8 @@ setup: $(STAMP)  ## make .venv and install catseye in it
 check: style types  ## style, types, layers
 
 style: setup
-	$(BIN)/ruff check src tests benchmarks studies docs
-	$(BIN)/ruff format --check src tests benchmarks studies docs
+	$(BIN)/ruff check src tests benchmarks studies tools docs
+	$(BIN)/ruff format --check src tests benchmarks studies tools docs
 	$(BIN)/lint-imports
 
 types: setup
@@ -60,9 +60,9 @@ front-check: front/node_modules  # types, and the committed files against a new 
 	diff -r front/built/web src/catseye/web/static
 	diff -r front/built/report src/catseye/gateways/writers/static
 
-docs: setup  ## the documentation in docs/_build/html: strict, every cell executed, opens from disk
+docs: setup  ## the documentation in docs/_build/html: strict, every command executed, links and words checked, opens from disk
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --jobs 2 -b html docs docs/_build/html
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/docs/make_docs.py docs docs/_build
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
@@ -76,8 +76,11 @@ bench: setup  ## all benchmarks beside others and the machine's limit, in one ta
 bench-guard: setup  ## their quick rows: fails where a ratio fell by a third against the table of `make bench`
 	$(BIN)/python benchmarks/run.py --guard
 
-release: setup  ## a wheel in dist/
-	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+release: setup  ## wheel and source in dist/, the same bits twice, tried in clean environments (RELEASE=--build-only)
+	$(BIN)/python tools/release.py $(RELEASE)
+
+lower-bounds: setup  ## the wheel with the lowest versions that pyproject.toml allows, on the oldest Python
+	$(BIN)/python tools/release.py --lower-bounds
 
 clean:  ## remove .venv and everything that can be made again
 	rm -rf .venv dist demo-night-01 docs/_build front/node_modules front/built .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -18,6 +18,8 @@ extensions = [
     "command_line",
     "commands",
     "docstrings",
+    "drawings",
+    "gallery",
     "myst_nb",
     "python_reference",
     "references",
@@ -26,10 +28,10 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["_build", "extensions", "README.md"]
-templates_path = []
+exclude_patterns = ["_build", "_templates", "extensions"]
+templates_path = ["_templates"]
 default_role = "code"
-language = "en_GB"
+language = "en"
 highlight_language = "text"
 nitpicky = True
 nitpick_ignore_regex = [
@@ -38,7 +40,6 @@ nitpick_ignore_regex = [
 ]
 
 autodoc_default_options = {"member-order": "bysource"}
-autodoc_preserve_defaults = True
 autodoc_typehints = "none"
 python_maximum_signature_line_length = 88
 python_use_unqualified_type_names = True
@@ -62,9 +63,26 @@ copybutton_line_continuation_character = "\\"
 
 html_theme = "pydata_sphinx_theme"
 html_title = f"catseye {release}"
+html_favicon = "_static/icon.svg"
 html_static_path = ["_static"]
+html_css_files = ["catseye.css"]
+html_js_files = ["catseye.js"]
+html_copy_source = False
 html_show_sourcelink = False
-html_theme_options = {"icon_links": [], "show_nav_level": 2, "navigation_with_keys": False}
+html_show_search_summary = False  # would be fetched, which a browser refuses where pages are opened from disk
+html_context = {"default_mode": "auto"}
+html_theme_options = {
+    "logo": {"image_light": "_static/logo.svg", "image_dark": "_static/logo-dark.svg", "alt_text": "catseye"},
+    "icon_links": [],
+    "show_nav_level": 1,
+    "navigation_depth": 3,
+    "navigation_with_keys": False,
+    "search_bar_text": "Search",
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["footer-version"],
+    "footer_end": [],
+}
+html_sidebars = {"index": []}
 
 
 def setup(app):

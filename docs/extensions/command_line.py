@@ -6,7 +6,8 @@
 
 `command` runs each line in order in a directory of the page's own, with `catseye` this checkout's. A line that
 ends in a backslash goes on in the next. Options: `:lines: 12` shows the first lines of each output; `:hide-output:`
-shows none; `:status: 1` is the exit status to expect. Any other status fails the build, with page and line.
+shows none; `:hide:` shows nothing at all; `:status: 1` is the exit status to expect. Any other status fails the build,
+with page and line.
 
 `command-file NAME` writes its content to a file of that directory and shows it. `command-figure NAME` shows a
 figure that an earlier command of the page wrote; `:alt:` describes it.
@@ -72,6 +73,7 @@ class Command(PageDirective):
         "lines": directives.positive_int,
         "status": int,
         "hide-output": directives.flag,
+        "hide": directives.flag,
     }
 
     def run(self) -> list[nodes.Node]:
@@ -91,7 +93,7 @@ class Command(PageDirective):
             shown.append(f"$ {command}")
             if outcome.output and "hide-output" not in self.options:
                 shown.append(self.shortened(outcome.output))
-        return [self.literal("\n".join(shown), "console")]
+        return [] if "hide" in self.options else [self.literal("\n".join(shown), "console")]
 
     def shortened(self, output: str) -> str:
         """First lines of an output, with a mark where more follow."""

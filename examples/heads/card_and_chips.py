@@ -6,7 +6,7 @@ Fill in the drivers below and serve it:
     asyncio.run(ZyServer(Ranger("ZY101", head, limits=(-21_309, 75_691))).serve())
 
 Nothing here waits. A search for the index and a track go on each time that the server looks at the head, some hundred
-times a second; between two looks the chips do their part alone. docs/heads.md says what every call promises.
+times a second; between two looks the chips do their part alone. `catseye help heads` says what every call promises.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from catseye.geometry.sky.time_tag import TimeTag
 from catseye.ranger.head import Buffer, Homing, SamplingSettings
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
 
-FILTER = (356, 465, 4355, 4096, 3)  # yours will differ: docs/studies/servo.md says how to find them
+FILTER = (356, 465, 4355, 4096, 3)  # yours will differ: `catseye help studies/servo` says how to find them
 ERROR_LIMIT = 5_000  # counts
 PACE = velocity_integer(12_000), acceleration_integer(40_000)  # of searches and tracks: counts/s, counts/s^2
 TURN = 100_000  # counts

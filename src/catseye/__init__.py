@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from catseye.api.pointing import fit_pointing, predict_pointing
     from catseye.api.pose import pose
     from catseye.api.positions import locate
-    from catseye.api.reading import examples, load
+    from catseye.api.reading import examples, load, topic, topics
     from catseye.api.result import save, show
     from catseye.api.scale.archive import archive, restore
     from catseye.api.scale.design import design
@@ -77,7 +77,7 @@ FACE = {  # file of catseye.api -> its exported names
     "pointing": ("fit_pointing", "predict_pointing"),
     "pose": ("pose",),
     "positions": ("locate",),
-    "reading": ("examples", "load"),
+    "reading": ("examples", "load", "topic", "topics"),
     "result": ("save", "show"),
     "scale.archive": ("archive", "restore"),
     "scale.design": ("design",),
@@ -153,6 +153,8 @@ __all__ = [
     "sound",
     "structure",
     "surface",
+    "topic",
+    "topics",
     "track",
     "track_pointing",
     "trends",

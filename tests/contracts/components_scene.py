@@ -7,7 +7,7 @@ Versions are those of constraints.txt and of front/package-lock.json, licences t
 import json
 import re
 import tomllib
-from importlib.metadata import PackageNotFoundError, metadata, requires
+from importlib.metadata import PackageNotFoundError, metadata, requires, version
 
 from repository import ROOT
 
@@ -67,6 +67,14 @@ def closure(names, pinned):
             if own or set(EXTRA.findall(marker or "")) <= set(extras.split(",")):
                 waiting.append((normal(requirement), wanted or ""))
     return {name for name, _ in found}
+
+
+def installed(name):
+    """Version of an installed package, None for one that is not."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
 
 
 def licence(name):

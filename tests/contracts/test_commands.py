@@ -247,6 +247,7 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 
 
 VERBS = ("plot",)  # groups whose name is the verb
+BUILTINS = {"help": "topic"}  # command whose name is one of Python's -> its function
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
 OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
 OF_SEVERAL = {  # command that takes one input or several -> function for several
@@ -276,6 +277,8 @@ ONE_CALL = sorted(set(callbacks()) - WITHOUT_CALL)
 def python_name(words):
     """Function of catseye that is a command: `pointing fit` is `fit_pointing`, `plot sky` is `plot_sky`."""
     parts = words.split()
+    if words in BUILTINS:
+        return BUILTINS[words]
     return "_".join(parts if parts[0] in VERBS else reversed(parts)).replace("-", "_")
 
 

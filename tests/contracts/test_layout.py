@@ -17,7 +17,7 @@ FAMILY = 4  # files of one prefix are a folder
 
 def folders():
     """Folders of ours that hold Python files, each with their stems; a test's without `test_`."""
-    for top in (PACKAGE, ROOT / "tests", ROOT / "benchmarks", ROOT / "studies"):
+    for top in (PACKAGE, ROOT / "tests", ROOT / "benchmarks", ROOT / "studies", ROOT / "tools"):
         for folder in (top, *(path for path in top.rglob("*") if path.is_dir() and path.name != "__pycache__")):
             stems = sorted(path.stem.removeprefix("test_") for path in folder.glob("*.py"))
             if stems:

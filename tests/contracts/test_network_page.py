@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import catseye
-from catseye.records.network.kinds import ENDS
-from catseye.records.network.toml import ALLOWED
+from catseye.records.network import toml
+from catseye.records.network.kinds import ANGLES, ENDS, LENGTHS, MAKERS
 from repository import ROOT
 
 PAGE = (ROOT / "docs" / "formats" / "network.md").read_text(encoding="utf-8")
@@ -34,7 +34,8 @@ def test_the_toml_is_adjusted(tmp_path):
     assert 0.01 < found.variance_factor < 4.0
 
 
-@pytest.mark.parametrize("kind", sorted({*ENDS, *ALLOWED}))
+@pytest.mark.parametrize("kind", sorted({*MAKERS, *ENDS, *toml.ALLOWED, *LENGTHS, *ANGLES}))
 def test_every_kind_and_its_points_are_told(kind):
     line = next(line for line in PAGE.splitlines() if line.startswith("|") and f"`{kind}`" in line)
     assert all(f"`{end}`" in line for end in ENDS.get(kind, ()))
+    assert re.search(rf"\b{kind}\b", toml.__doc__)

@@ -74,8 +74,9 @@ def test_the_page_of_a_sites_files_lists_the_kinds_and_their_axes():
         assert all((f"`{key}`" in keys) == glass for key in GLASS_KEYS), name
 
 
-def test_the_documentation_of_air_lists_every_model():
-    listed = re.search(r"^ +model +(\w.*)$", catseye.air.__doc__, re.MULTILINE)
+@pytest.mark.parametrize(("function", "argument"), [(catseye.air, "model"), (catseye.acoustic, "air_model")])
+def test_the_documentation_of_air_lists_every_model(function, argument):
+    listed = re.search(rf"^ +{argument} +(\w.*)$", function.__doc__, re.MULTILINE)
     assert re.findall(r"\w*\d{4}\w*", listed[1]) == list(names.AIR_MODELS)
 
 

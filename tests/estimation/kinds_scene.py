@@ -10,6 +10,12 @@ N = 3 * POINTS + OTHERS
 P = 3 * np.arange(POINTS)
 
 
+def of_kinds(made, *names):
+    """Groups of some kinds, by their class names."""
+    found = {type(group).__name__: group for group in made}
+    return tuple(found[name] for name in names)
+
+
 def groups(seed):
     """One group of every kind over six random points and twelve other parameters, and the parameters."""
     rng = np.random.default_rng(seed)
@@ -64,7 +70,7 @@ def groups(seed):
         kinds.FramePoints("a", np.zeros(9), np.ones(9), P[:3], np.tile(pose, (3, 1)), turns, np.array([9, -1, 12])),
         kinds.Linear("a", zeros, ones, other[:5], rng.normal(size=(4, 5))),
     )
-    joint = kinds.Joint.of("a", (made[0], made[4], made[-1]), np.eye(12))
+    joint = kinds.Joint.of("a", of_kinds(made, "Distances", "Directions", "Linear"), np.eye(12))
     x = rng.normal(size=N)  # turns of about a radian, tilts of the order of one
     ring = 2.0 * np.pi * rng.permutation(POINTS) / POINTS + rng.uniform()  # so that no two are above each other
     x[: 3 * POINTS] += (20.0 * np.stack([np.sin(ring), np.cos(ring), rng.normal(size=POINTS)], axis=1)).ravel()

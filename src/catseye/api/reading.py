@@ -1,4 +1,4 @@
-"""`load` and `examples`: a file or folder by what it holds, and what comes with catseye."""
+"""`load`, `examples` and `topic`: a file or folder by what it holds, and what comes with catseye."""
 
 import os
 import tomllib
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.night.campaign import Campaign
     from catseye.records.site.folder import SiteFolder
+    from catseye.records.topics.pages import Topic
 
     Loaded: TypeAlias = Campaign | SiteFolder | ObservationNetwork | SolvedPoints | Record | JournalReader
 
@@ -45,6 +46,33 @@ def examples(name: str | None = None, *, directory: "str | os.PathLike[str] | No
 
         return copy_example(name or "", Path(directory))
     return example_names() if name is None else example(name)
+
+
+def topics() -> dict[str, str]:
+    """Titles of all pages of the documentation, by name.
+
+    >>> topics()["conventions"]
+    'Conventions'
+    """
+    from catseye.records.topics.pages import topic_titles
+
+    return topic_titles()
+
+
+def topic(name: str) -> "Topic":
+    """Page of the documentation that comes with catseye.
+
+    name   one of `topics()`: "conventions", "formats/beam"; or the last part of one, where it is the only one
+
+    Returns a Topic: `title`, `text` in Markdown, which it is printed as, and the names of `related` topics. Raises
+    InputError with near matches for an unknown name.
+
+    >>> topic("network").name
+    'formats/network'
+    """
+    from catseye.records.topics.pages import read_topic
+
+    return read_topic(name)
 
 
 def place_of(source: "str | os.PathLike[str]", *, output: bool = False) -> Path:

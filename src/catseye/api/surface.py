@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from catseye.optics.zernike import Numbering
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.surface.actuators import Travel
+    from catseye.reduction.surface.dish import DishDesign
     from catseye.reduction.surface.findings import SurfaceFindings
     from catseye.reduction.surface.prisms import EpochPlace, Frame
     from catseye.reduction.surface.shape import Prisms
@@ -37,6 +38,10 @@ LIMITS = {  # argument -> smallest and largest value, unit
     "taper_db": (0.0, 60.0, "dB"),
     "frequency_ghz": (0.01, 1e4, "GHz"),
     "zernike": (1, 500, "terms"),
+    "focal_length_m": (0.05, 1000.0, "m"),
+    "radius_m": (0.02, 500.0, "m"),
+    "diameter_m": (0.04, 1000.0, "m"),
+    "u_mm": (1e-6, 100.0, "mm"),
     "azimuth_deg": (-540.0, 540.0, "degrees"),
     "elevation_deg": (-10.0, 100.0, "degrees"),
 }
@@ -184,7 +189,14 @@ def surface(
     u: Annotated[Any, In("m")] = None,
     covariance: Annotated[Any, In("m2")] = None,
     names: Sequence[str] | None = None,
-    site: "str | os.PathLike[str] | SiteFolder" = "gbt",
+    site: "str | os.PathLike[str] | SiteFolder | None" = None,
+    focal_length_m: Annotated[Any, In("m", one=True)] = None,
+    radius_m: Annotated[Any, In("m", one=True)] = None,
+    diameter_m: Annotated[Any, In("m", one=True)] = None,
+    centre: Annotated[Any, In("m", many=True)] = (0.0, 0.0),
+    vertex: Annotated[Any, In("m", many=True)] = (0.0, 0.0, 0.0),
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    u_mm: Annotated[Any, In("mm", one=True)] = None,
     free: Sequence[str] = ("vertex", "axis", "focal-length"),
     taper_db: Annotated[Any, In("dB", one=True)] = 0.0,
     frequency_ghz: Annotated[Any, In("GHz", many=True)] = (),
@@ -207,7 +219,12 @@ def surface(
     u               of points, m: a number, (n,), or (n, 3) by coordinate; independent of each other; or
     covariance      of points, m²: (n, 3, 3), or (3n, 3n) of all together; of every epoch
     names           of points; P1, P2, ... without
-    site            the telescope's records
+    site            the telescope's records; gbt without. Or another dish:
+    focal_length_m  of its paraboloid, roughly where it is fitted; with
+    radius_m, diameter_m   one of the two, of its aperture
+    centre          (2,) m, of an offset dish's aperture from the axis, along the dish's x and y
+    vertex, axis    (3,) m and (3,) of any length, in the frame of the points; roughly, where they are fitted
+    u_mm            of each coordinate of tables without columns of u
     free            what is fitted: of "vertex", "axis", "focal-length"
     taper_db        illumination's edge below its middle
     frequency_ghz   gain there
@@ -226,6 +243,11 @@ def surface(
     >>> found = surface(points=dish, u=1e-4)
     >>> round(found.focal_length, 6), bool(np.abs(found.deviations).max() < 1e-9)
     (60.0, True)
+
+    >>> ring = surface(points=dish - [0.0, 55.0, 0.0], u=1e-4, focal_length_m=60.0, radius_m=57.0, vertex=(0, -55, 0),
+    ...                centre=(0.0, 55.0))
+    >>> ring.found.dish.site is None, np.round(ring.translation, 9).tolist()
+    (True, [0.0, 0.0, 0.0])
     """
     from catseye.reduction.surface.findings import reduce_surface
     from catseye.reduction.surface.shape import ShapeSettings
@@ -233,7 +255,14 @@ def surface(
     _refuse_values(taper_db=taper_db, frequency_ghz=frequency_ghz, zernike=zernike, elevation_deg=elevation_deg)
     _refuse_values(azimuth_deg=() if azimuth_deg is None else azimuth_deg)
     _refuse_words(free=free, order=[order], frame=[frame], travel=[travel])
-    placed = _Placed(_site(site), frame, azimuth_deg, _row(elevation_deg), _row(temperature_c))
+    given = {"focal_length_m": focal_length_m, "radius_m": radius_m, "diameter_m": diameter_m, "u_mm": u_mm}
+    _refuse_values(**{name: value for name, value in given.items() if value is not None})
+    dish = _dish(site, given, centre=centre, vertex=vertex, axis=axis)
+    if dish.site is None:
+        _refuse_of_site(frame=frame != "reflector", azimuth_deg=azimuth_deg is not None, actuators=actuators)
+    placed = _Placed(
+        dish, frame, azimuth_deg, _row(elevation_deg), _row(temperature_c), None if u_mm is None else u_mm * MILLIMETRE
+    )
     if points is None:
         prisms, hashes, sources = _of_inputs(inputs, placed)
     elif inputs:
@@ -242,7 +271,7 @@ def surface(
         prisms, hashes, sources = _of_points(points, u, covariance, names, placed), {}, ()
     found = reduce_surface(
         prisms,
-        placed.site,
+        dish,
         ShapeSettings(tuple(free), taper_db, tuple(f * 1e9 for f in _row(frequency_ghz)), zernike, order),
         actuators=actuators,
         positions=_positions(positions, sources, actuators=actuators),
@@ -257,10 +286,54 @@ def _row(values: float | Sequence[float]) -> tuple[float, ...]:
     return tuple(np.atleast_1d(np.asarray(values, dtype=float)).tolist())
 
 
-def _site(site: "str | os.PathLike[str] | SiteFolder") -> "SiteFolder":
-    from catseye.records.site.folder import SiteFolder, read_site
+def _dish(
+    site: "str | os.PathLike[str] | SiteFolder | None",
+    given: dict[str, Any],
+    *,
+    centre: Sequence[float],
+    vertex: Sequence[float],
+    axis: Sequence[float],
+) -> "DishDesign":
+    """Design: of a site's records, or of a focal length with a size.
 
-    return site if isinstance(site, SiteFolder) else read_site(place_of(site))
+    given   focal_length_m, radius_m and diameter_m; None where they are not given
+
+    Raises ArgumentError for arguments that do not fit together.
+    """
+    from catseye.records.site.folder import SiteFolder, read_site
+    from catseye.reduction.surface.dish import DishDesign
+
+    focal_length, radius, diameter = given["focal_length_m"], given["radius_m"], given["diameter_m"]
+    rows = {"centre": (centre, 2), "vertex": (vertex, 3), "axis": (axis, 3)}
+    numbers = {name: np.array(_row(value)) for name, (value, _) in rows.items()}
+    if focal_length is None:
+        moved = {"radius_m": radius is not None, "diameter_m": diameter is not None}
+        moved |= {name: bool(np.any(numbers[name] != (0.0, 0.0, 1.0)[-rows[name][1] :])) for name in ("axis",)}
+        moved |= {name: bool(np.any(numbers[name])) for name in ("centre", "vertex")}
+        for name, is_given in moved.items():
+            if is_given:
+                raise ArgumentError(f"{name} needs focal_length_m, too: a dish without a site", name, "focal_length_m")
+        return DishDesign.of_site(site if isinstance(site, SiteFolder) else read_site(place_of(site or "gbt")))
+    if site is not None:
+        raise ArgumentError("give site or focal_length_m, one of the two", "site", "focal_length_m")
+    if (radius is None) == (diameter is None):
+        raise ArgumentError(
+            "focal_length_m needs radius_m or diameter_m, one of the two", "focal_length_m", "radius_m", "diameter_m"
+        )
+    for name, (_, count) in rows.items():
+        if numbers[name].shape != (count,) or not np.isfinite(numbers[name]).all():
+            raise InputError(f"{name} = {numbers[name].tolist()} (expected {count} numbers)")
+    return DishDesign.of_paraboloid(
+        focal_length, diameter / 2.0 if radius is None else radius, **numbers,
+        size="diameter_m" if radius is None else "radius_m",
+    )  # fmt: skip
+
+
+def _refuse_of_site(**given: bool) -> None:
+    """Raise ArgumentError for arguments that need a site's records."""
+    for name, is_given in given.items():
+        if is_given:
+            raise ArgumentError(f"{name} needs the records of a site, not focal_length_m", name, "focal_length_m")
 
 
 def _positions(
@@ -297,13 +370,14 @@ def require_actuators_file(path: Path | None, *sources: "str | os.PathLike[str]"
 
 @dataclass(frozen=True)
 class _Placed:
-    """Site and frame of tables and points, and postures and temperatures of the epochs."""
+    """Dish and frame of tables and points, and postures and temperatures of the epochs."""
 
-    site: "SiteFolder"
+    dish: "DishDesign"
     frame: "Frame"
     azimuth_deg: float | None
     elevation_deg: Sequence[float]
     temperature_c: Sequence[float]
+    u: float | None
 
     def of(self, epoch: int) -> "EpochPlace":
         """Frame and posture of one epoch."""
@@ -311,7 +385,7 @@ class _Placed:
 
         elevation = self.elevation_deg[epoch] if self.elevation_deg else None
         temperature = self.temperature_c[epoch] if self.temperature_c else None
-        return EpochPlace(self.frame, self.azimuth_deg, elevation, temperature)
+        return EpochPlace(self.frame, self.azimuth_deg, elevation, temperature, self.u)
 
     def require(self, count: int) -> None:
         """Raise InputError where a posture or temperature is missing or too many."""
@@ -365,7 +439,7 @@ def _of_inputs(inputs: "Sequence[Input]", placed: _Placed) -> "tuple[list[Prisms
             hashes |= epoch.reduction.campaign.hashes
             continue
         places.append(place_of(epoch, output=True))
-        table, read = read_prisms(places[-1], placed.site, placed.of(k))
+        table, read = read_prisms(places[-1], placed.dish, placed.of(k))
         prisms.append(table)
         hashes |= read
     return prisms, hashes, tuple(places)
@@ -394,7 +468,7 @@ def _of_points(points: Any, u: Any, covariance: Any, names: Sequence[str] | None
     labels = tuple(names) if names is not None else tuple(f"P{k + 1}" for k in range(n))
     return [
         prisms_of_points(
-            epoch, q, labels, placed.site, placed.of(k), source="points" if len(x) == 1 else f"points {k + 1}"
+            epoch, q, labels, placed.dish, placed.of(k), source="points" if len(x) == 1 else f"points {k + 1}"
         )
         for k, epoch in enumerate(x)
     ]

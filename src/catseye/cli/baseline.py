@@ -61,7 +61,8 @@ class _Inputs(NamedTuple):
     """The files that are read."""
 
     observations: Annotated[
-        Path, typer.Argument(metavar="OBSERVATIONS.csv", help="Shots with their weather: docs/formats/baseline.md.")
+        Path,
+        typer.Argument(metavar="OBSERVATIONS.csv", help="Shots with their weather: catseye help formats/baseline."),
     ]
     heights: Annotated[
         Path | None, typer.Option("--heights", metavar="HEIGHTS.csv", help="Heights of pillars; level without.")

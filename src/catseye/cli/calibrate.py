@@ -12,7 +12,7 @@ from catseye.cli.vocabularies import CALIBRATION_KINDS, one_of
 
 @app.command(
     epilog="\b\nExample: catseye calibrate linearity examples/calibrations/linearity.csv --certificate zp103.html\n"
-    "Columns and keys of every KIND: docs/formats/calibrations.md"
+    "Columns and keys of every KIND: catseye help formats/calibrations"
 )
 def calibrate(  # noqa: PLR0913 - its options are its command line
     kind: Annotated[

@@ -24,10 +24,10 @@ ROOMS = (
     *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
-    *("scale.archive", "scale.design", "scale.query", "scale.trends"),
+    *("scale.archive", "scale.design", "scale.query", "scale.trends", "help"),
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
-    "Begin here": ("demo", "examples"),
+    "Begin here": ("demo", "examples", "help"),
     "A night of ranges": ("reduce", "explain", "night"),
     "Networks": ("adjust", "plan", "design", "baseline"),
     "The telescope": ("pose", "surface", "pointing", "structure", "panels"),
@@ -133,11 +133,12 @@ Job = Annotated[
 
 @app.callback(
     epilog="\b\nExample: catseye demo\n"
-    "A path may be an example's name: night-01, gbt, networks/feed-arm.toml (catseye examples lists them)"
+    "A path may be an example's name: night-01, gbt, networks/feed-arm.toml (catseye examples lists them)\n"
+    "Documentation: catseye help lists its topics"
 )
 def catseye(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Laser metrology for large telescopes and structures: raw samples to coordinates, with uncertainty."""

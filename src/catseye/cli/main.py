@@ -5,7 +5,7 @@ import signal
 import sys
 from types import FrameType
 
-LIVING = ("zy", "ziy", "simulate", "serve", "view")  # which end in an order of their own
+LIVING = ("zy", "ziy", "simulate", "serve", "view", "help")  # which end in an order of their own, or their pager's
 WORDS = {signal.SIGINT: b"interrupted by Ctrl-C", signal.SIGTERM: b"terminated"}
 
 

@@ -209,7 +209,9 @@ def polarization(
 
 @plots.command(epilog="\b\nExample: catseye plot beam examples/beams/head.toml --out beam.svg")
 def beam(
-    train: Annotated[Path, typer.Argument(metavar="TRAIN.toml", help="A train of elements: docs/formats/beam.md.")],
+    train: Annotated[
+        Path, typer.Argument(metavar="TRAIN.toml", help="A train of elements: catseye help formats/beam.")
+    ],
     out: Out,
     json: Json = False,
     quiet: Quiet = False,

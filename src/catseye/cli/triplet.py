@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 def triplet(  # noqa: PLR0913 - its options are its command line
     files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="FILE.toml ...", help="Sheets of measured units: docs/formats/triplet.md."),
+        typer.Argument(metavar="FILE.toml ...", help="Sheets of measured units: catseye help formats/triplet."),
     ] = None,
     blank: Annotated[
         Path | None, typer.Option("--blank", metavar="SHEET.html", help="Blank form to write, to print and fill in.")

@@ -5,6 +5,7 @@ from operator import attrgetter
 
 import pytest
 
+from catseye.names import AIR_MODEL, AIR_MODELS
 from repository import TESTS
 from vector_scene import function_of
 
@@ -19,6 +20,18 @@ def test_a_printed_number_is_reproduced(vector):
     assert float(got) / vector.get("scale", 1.0) == pytest.approx(
         vector["expected"], rel=0.0, abs=vector["tolerance"]
     ), f"{vector['source']}: {vector['why']}"
+
+
+@pytest.mark.parametrize("model", AIR_MODELS)
+def test_every_model_has_two_vectors_at_least(model):
+    """A vector names its model as an argument, or its function is in the model's file, or it is the default's."""
+    own = [
+        vector["name"]
+        for vector in VECTORS
+        if vector["inputs"].get("model", AIR_MODEL if ".air." in vector["function"] else "") == model
+        or f".{model}." in vector["function"]
+    ]
+    assert len(own) >= 2
 
 
 def test_carbon_dioxide_moves_the_group_index_as_stated():

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from catseye.errors import EstimationError
 from catseye.estimation.observations import kinds
 from draws import examples
-from estimation.kinds_scene import N, P, groups
+from estimation.kinds_scene import N, P, groups, of_kinds
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -67,6 +67,12 @@ def test_a_report_can_name_every_row(which):
     values, jacobian = group.predict(x)
     assert values.shape == (m,)
     assert jacobian.shape == ((m, len(group.columns)) if group.columns.ndim == 1 else group.columns.shape)
+
+
+def test_every_kind_is_held_to_the_laws():
+    """`kinds_scene.py` has a group of each; moving ranges have laws of their own."""
+    others = {"ObservationGroup", "ObservationKind", "Reported", "MovingDistances"}
+    assert set(NAMES) == set(kinds.__all__) - others
 
 
 def test_kinds_have_names_of_their_own():
@@ -158,7 +164,7 @@ def test_a_parameter_that_is_absent_counts_as_zero():
 
 def test_joint_group_stacks_its_parts():
     made, x = groups(9)
-    parts = (made[0], made[4], made[-2])
+    parts = of_kinds(made, "Distances", "Directions", "Linear")
     joint = kinds.Joint.of("j", parts, np.eye(12))
     values, jacobian = joint.predict(x)
     expected = [wide(p, p.predict(x)[1]) for p in parts]

@@ -6,6 +6,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.estimation.observations.kinds import Distances
 from catseye.records.network.any_file import read_network
+from catseye.records.network.kinds import ANGLES, LENGTHS
 from repository import TESTS
 
 FROZEN = TESTS / "vectors" / "formats" / "network-1.toml"
@@ -146,10 +147,7 @@ REFUSED = {
     '[[ranger]]\nname = "A"\nzero = "loose"': ("ranger 1, zero = 'loose' (expected 'free', or a value with its unit)"),
     '[[ranger]]\nname = "A"\nzero = "free"\nu_zero_mm = 1': "ranger 1, is free and has u_zero (expected one of them)",
     '[[parameter]]\nname = "k"': ("parameter 1, value is missing (expected value_mm, value_ppm, value_arcsec etc.)"),
-    '[[observation]]\nkind = "range"': (
-        "observation 1, kind = 'range' (expected slope_distance horizontal_distance distance_difference fixed_distance "
-        "height_difference coordinates vector level_plane direction angle azimuth zenith_angle inclination)"
-    ),
+    '[[observation]]\nkind = "range"': f"observation 1, kind = 'range' (expected {' '.join((*LENGTHS, *ANGLES))})",
     SLOPE + "value_m = 10": "observation 1, u is missing (expected u_m, u_mm, u_um)",
     SLOPE + "u_mm = 1": "observation 1, value is missing (expected value_m, value_mm, value_um)",
     SLOPE + "value_m = nan\nu_mm = 1": "observation 1, value_m = nan (expected a finite number)",

@@ -14,7 +14,7 @@ from catseye.names import AIR_MODEL
 
 @app.command(
     epilog="\b\nExample: catseye acoustic examples/acoustic/evening-1.wav --sheet examples/acoustic/evening.toml\n"
-    "Layouts of FILE and SHEET: docs/formats/acoustic.md"
+    "Layouts of FILE and SHEET: catseye help formats/acoustic"
 )
 def acoustic(  # noqa: PLR0913 - its options are its command line
     files: Annotated[

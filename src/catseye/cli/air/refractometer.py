@@ -30,7 +30,7 @@ def _within(low: float, high: float, unit: str) -> Callable[[float | None], floa
 )
 def refractometer(  # noqa: PLR0913 - its options are its command line
     readings: Annotated[
-        Path, typer.Argument(metavar="FILE.csv", help="Phases with their weather: docs/formats/refractometer.md.")
+        Path, typer.Argument(metavar="FILE.csv", help="Phases with their weather: catseye help formats/refractometer.")
     ],
     sheet: Annotated[
         Path | None, typer.Option("--sheet", metavar="FILE.toml", help="Sheet of the path; FILE.toml beside.")

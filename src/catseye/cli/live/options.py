@@ -49,7 +49,7 @@ Faults = Annotated[
     typer.Option(
         "--fault",
         metavar='"KIND WHOM [START [END [SIZE]]]"',
-        help="Fault of the twin, s since its start; may repeat. docs/living.md has the kinds.",
+        help="Fault of the twin, s since its start; may repeat. catseye help living has the kinds.",
     ),
 ]
 PortBase = Annotated[

@@ -11,7 +11,7 @@ from catseye.cli.results import tell
 
 @app.command(
     epilog="\b\nExample: catseye beam examples/beams/head.toml --distance-m 120 --out beam\n"
-    "Layout of FILE: docs/formats/beam.md"
+    "Layout of FILE: catseye help formats/beam"
 )
 def beam(
     file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="The beam's elements, laser to detector.")],

@@ -12,7 +12,7 @@ from catseye.cli.vocabularies import EDITIONS, one_of
 
 @app.command(
     epilog="\b\nExample: catseye safety --power-mw 10 --wavelength-um 0.780 --diameter-mm 20 --divergence-mrad 0.05 "
-    "--scan-rad-per-s 0.5\nA warning for planning, never a certificate: docs/safety.md says what is left out."
+    "--scan-rad-per-s 0.5\nA warning for planning, never a certificate: catseye help safety says what is left out."
 )
 def safety(  # noqa: PLR0913 - its options are its command line
     power_mw: Annotated[float, typer.Option("--power-mw", help="Power of the beam, continuous, mW.")],

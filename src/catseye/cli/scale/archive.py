@@ -32,7 +32,7 @@ NO_UPKEEP = Upkeep()
 
 @app.command(
     epilog="\b\nExample: catseye archive years night-01\nExample: catseye archive years --check --compact\n"
-    "A night that is there already stays as it is; format: docs/formats/archive.md"
+    "A night that is there already stays as it is; format: catseye help formats/archive"
 )
 @grouped
 def archive(

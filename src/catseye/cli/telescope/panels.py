@@ -20,7 +20,7 @@ def _focal(value: float) -> float:
 @app.command(
     epilog="\b\nExample: catseye panels examples/panels/as-found.csv --instrument examples/panels/tool.toml "
     "--layout gbt\n         --survey examples/panels/survey.csv --as-left examples/panels/as-left.csv --out panels\n"
-    "Layouts of all files: docs/formats/panels.md"
+    "Layouts of all files: catseye help formats/panels"
 )
 def panels(  # noqa: PLR0913 - its options are its command line
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Placements of the tool, as found.")],

@@ -27,7 +27,7 @@ Out = Annotated[
 
 @pointing.command(
     epilog="\b\nExample: catseye pointing fit examples/pointing/stars.dat --against published --out pointing-report\n"
-    "Layout of STARS.dat: docs/formats/star-offsets.md; POSE.json: catseye pose --pointing prime --out"
+    "Layout of STARS.dat: catseye help formats/star-offsets; POSE.json: catseye pose --pointing prime --out"
 )
 def fit(  # noqa: PLR0913 - its options are its command line
     files: Annotated[
@@ -99,7 +99,7 @@ def predict(
 @pointing.command(
     epilog="\b\nExample: catseye pointing track --tilts examples/pointing/tilts.csv --harmonics 3\n"
     "Example: catseye pointing track pose-000/pose.json pose-090/pose.json --tilts tilts.csv --harmonics 2\n"
-    "POSE.json: catseye pose --group alidade --frame alidade --out; TILTS.csv: docs/formats/star-offsets.md"
+    "POSE.json: catseye pose --group alidade --frame alidade --out; TILTS.csv: catseye help formats/star-offsets"
 )
 def track(
     poses: Annotated[

@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 
 from catseye.cli.commands import Json, Quiet, Threads, app
+from catseye.cli.numbers import row_of
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
@@ -36,6 +37,54 @@ def _angles(values: list[float] | None) -> list[float]:
         if not -10.0 <= value <= 100.0:
             raise typer.BadParameter(f"{value} is no elevation (expected -10 to 100°).")
     return values or []
+
+
+class _Design(NamedTuple):
+    """Options of a dish without a site."""
+
+    focal_length_m: Annotated[
+        float | None,
+        typer.Option(
+            "--focal-length-m",
+            min=0.05,
+            max=1000.0,
+            help="Focal length of a dish without a site, m; roughly where it is fitted.",
+        ),
+    ] = None
+    radius_m: Annotated[
+        float | None, typer.Option("--radius-m", min=0.02, max=500.0, help="Radius of its aperture, m; or")
+    ] = None
+    diameter_m: Annotated[
+        float | None, typer.Option("--diameter-m", min=0.04, max=1000.0, help="Diameter of its aperture, m.")
+    ] = None
+    centre: Annotated[
+        str,
+        typer.Option(
+            "--centre",
+            metavar="X,Y",
+            callback=row_of(2, "x,y in metres"),
+            help="Middle of an offset dish's aperture from the axis, m, along the dish's x and y.",
+        ),
+    ] = "0,0"
+    vertex: Annotated[
+        str,
+        typer.Option(
+            "--vertex", metavar="X,Y,Z", callback=row_of(3, "x,y,z in metres"), help="Its vertex, roughly, m."
+        ),
+    ] = "0,0,0"
+    axis: Annotated[
+        str,
+        typer.Option(
+            "--axis",
+            metavar="X,Y,Z",
+            callback=row_of(3, "x,y,z"),
+            help="Direction from its vertex to its focus, roughly.",
+        ),
+    ] = "0,0,1"
+    u_mm: Annotated[
+        float | None,
+        typer.Option("--u-mm", min=1e-6, max=100.0, help="u of each coordinate of tables without columns of u, mm."),
+    ] = None
 
 
 class _Shape(NamedTuple):
@@ -129,9 +178,10 @@ class _Corrections(NamedTuple):
 @app.command(
     epilog="\b\nExample: catseye surface night-01-report --taper-db 13 --frequency-ghz 86 --out surface\n"
     "         catseye surface before.csv after.csv --zernike 21\n"
+    "         catseye surface points.csv --focal-length-m 9 --diameter-m 25 --frequency-ghz 86\n"
     "         catseye surface e10 e30 e50 e80 e50b e30b --actuators actuators.csv --out lookup\n"
     "One input: its shape; two: second less first as well; from three on: a look-up table by elevation. "
-    "Tables: docs/formats/surface.md"
+    "Tables: catseye help formats/surface"
 )
 @grouped
 def surface(  # noqa: PLR0913 - its options are its command line
@@ -139,12 +189,14 @@ def surface(  # noqa: PLR0913 - its options are its command line
     inputs: Annotated[
         list[Path],
         typer.Argument(
-            metavar="INPUT…", help="Directories of catseye reduce --out, or tables of prisms; in the order measured."
+            metavar="INPUT…", help="Directories of catseye reduce --out, or tables of points; in the order measured."
         ),
     ],
     site: Annotated[
-        str, typer.Option("--site", metavar="SITE", help="Site of the telescope: gbt, or a folder.")
-    ] = "gbt",
+        str | None,
+        typer.Option("--site", metavar="SITE", help="Site of the telescope: gbt, or a folder.  [default: gbt]"),
+    ] = None,
+    design: _Design,
     shape: _Shape,
     reading: _Reading,
     wanted: _Corrections,
@@ -167,7 +219,13 @@ def surface(  # noqa: PLR0913 - its options are its command line
     progress = ProgressLine(quiet)
     try:
         result = surface_of(
-            *inputs, site=site, **shape.options(), **reading.options(), **wanted.options(), progress=progress
+            *inputs,
+            site=site,
+            **design._asdict(),
+            **shape.options(),
+            **reading.options(),
+            **wanted.options(),
+            progress=progress,
         )
         if wanted.actuators is not None:
             result.save_actuators(wanted.actuators)  # before the directory: no directory without it

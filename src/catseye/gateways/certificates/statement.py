@@ -57,7 +57,7 @@ BUDGET_NOTE = (
 )
 CONVENTIONS = (
     "Each value has the sign that the description beside it says: too long, too high, added to the measured length. "
-    f"Axes, angles and senses of rotation are those of catseye {__version__}, docs/conventions.md."
+    f"Axes, angles and senses of rotation are those of catseye {__version__} (catseye help conventions)."
 )
 RULES = {
     "simple-acceptance": "Simple acceptance (ILAC-G8:09/2019, 4.2.1): pass where the value lies within the limits; the "

@@ -12,6 +12,7 @@ from catseye.gateways.surface.objects import (
     FORMAT,
     actuators_object,
     change_object,
+    dish_object,
     lookup_object,
     shape_object,
 )
@@ -43,7 +44,7 @@ from catseye.reduction.surface.findings import SurfaceFindings
 
 def surface_object(result: SurfaceFindings) -> dict[str, Any]:
     """Object that `catseye surface --json` prints: one epoch's keys, or `epochs`, `change`, `lookup`."""
-    answer: dict[str, Any] = {"format": FORMAT, "verdict": result.verdict.to_object()}
+    answer: dict[str, Any] = {"format": FORMAT, "verdict": result.verdict.to_object(), "dish": dish_object(result.dish)}
     if len(result.shapes) == 1:
         answer |= shape_object(result.shapes[0])
     else:
@@ -81,7 +82,8 @@ def write_surface(
     files["surface.json"] = lambda: json_page(surface_object(result))
     files["report.html"] = lambda: report_page(surface_report(result, when, inputs))
     outputs: Files = files
-    provenance = {"format": FORMAT, "made_by": "catseye surface", "settings": asdict(result.shapes[-1].settings)}
+    provenance = {"format": FORMAT, "made_by": "catseye surface", "dish": dish_object(result.dish)}
+    provenance["settings"] = asdict(result.shapes[-1].settings)
     write_files(outputs, directory, {**provenance, **origin(when, inputs)}, progress=progress)
     written: list[Table[Any]] = [PRISMS, ZERNIKE, LOOKUP, EPOCHS, ACTUATORS]
     join_tables(directory, written, frame="fitted paraboloid: vertex at its origin, axis along z")

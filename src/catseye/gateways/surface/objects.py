@@ -10,12 +10,27 @@ from catseye.gateways.writers.passage import Passage
 from catseye.optics.zernike import Numbering, number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
+from catseye.reduction.surface.dish import TABLE, DishDesign
 from catseye.reduction.surface.findings import SurfaceFindings
 from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, SurfaceShape
 
 FORMAT = "catseye-surface-1"
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
+
+
+def dish_object(dish: DishDesign) -> dict[str, Any]:
+    """Design as an object for JSON."""
+    aperture, nominal = dish.aperture, dish.nominal
+    return {
+        "site": None if dish.site is None else dish.site.site.campaign.name,
+        "focal_length": aperture.focal_length,
+        "radius": aperture.radius,
+        "centre": aperture.centre,
+        "vertex": None if nominal is None else nominal.translation,
+        "axis": None if nominal is None else nominal.rotation[:, 2],
+        "x": None if nominal is None else nominal.rotation[:, 0],
+    }
 
 
 def shape_object(shape: SurfaceShape) -> dict[str, Any]:
@@ -61,7 +76,7 @@ def change_object(change: Change) -> dict[str, Any]:
         "motion": change.motion,
         "motion_covariance": change.motion_covariance,
         "motion_order": ["translation x", "y", "z", "rotation x", "y", "z"],
-        "frame": "reflector",
+        "frame": change.first.nominal.from_,
         "pivot": [0.0, 0.0, 0.0],
         **_square(change.square),
         "gain": [_gain(g) for g in change.gains],
@@ -173,10 +188,11 @@ def shape_passages(shape: SurfaceShape) -> list[Passage]:
     """Passages on one epoch, in order."""
     fit, square = shape.fit, shape.square
     u = np.sqrt(np.diag(fit.deviation_covariance)) / MILLIMETRE
+    noun = "points" if shape.prisms.nominal.to == TABLE else "prisms"
     passages = [
         Passage(
             "The dish",
-            f"{len(shape.prisms.names)} prisms of {shape.prisms.source}, normal deviations {shape.rms_normal * 1e3:.3f}"
+            f"{len(shape.prisms.names)} {noun} of {shape.prisms.source}, normal deviations {shape.rms_normal * 1e3:.3f}"
             f" mm rms, u {u.min():.3f} to {u.max():.3f} mm each",
         ),
         Passage("Paraboloid", f"free: {', '.join(fit.free) or 'nothing'}. {_pose(shape)}"),
@@ -184,11 +200,12 @@ def shape_passages(shape: SurfaceShape) -> list[Passage]:
     ]
     passages += [_gain_passage(g) for g in shape.gains]
     if shape.absorbed:
+        dish = "offset dish" if np.any(shape.aperture.centre) else "dish with a shift of its vertex"
         absorbed = ", ".join(term.name for term in shape.absorbed)
         passages.append(
             Passage(
                 "Note",
-                f"the free paraboloid absorbs most of {absorbed} as a rotation of the offset dish; hold the axis (free "
+                f"the free paraboloid absorbs most of {absorbed} as a rotation of the {dish}; hold the axis (free "
                 "vertex and focal length), fit fewer terms and use `joint`, or compare two epochs",
             )
         )
@@ -240,7 +257,7 @@ def change_passages(change: Change) -> list[Passage]:
             f"{change.second.source} minus {change.first.source}, {len(change.names)} prisms: the surface by "
             f"{rms * 1e3:.3f} mm rms along its normals, after removing the dish's motion relative to its posture",
         ),
-        Passage("Motion", f"{shift} mm; {turn}″, reflector axes, about the nominal vertex"),
+        Passage("Motion", f"{shift} mm; {turn}″, {change.first.nominal.from_} axes, about the nominal vertex"),
         Passage("Half path", _rms(change.square, change.settings.taper_db)),
         *[_gain_passage(g) for g in change.gains],
     ]

@@ -31,13 +31,14 @@ TEXT = None  # limits of a text column
 class Sheet(Record):
     """Sheet common to all calibrations.
 
-    kind                     kind of calibration, by its name in the command
-    instrument               calibrated instrument: "ZP103", "EDM 7"
-    serial                   serial number
-    measured_on, valid_until dates
-    by                       person who measured
-    report                   reference to the report
-    level                    of the tests: probability of any false alarm among the readings
+    kind          kind of calibration, by its name in the command
+    instrument    calibrated instrument: "ZP103", "EDM 7"
+    serial        serial number
+    measured_on   day of the readings
+    valid_until   last day of validity, after measured_on
+    by            person who measured
+    report        reference to the report
+    level         of the tests: probability of any false alarm among the readings
     """
 
     format: Annotated[int | str, Version("readings")] = 1

@@ -29,10 +29,11 @@ class Record(BaseModel):
 class Certificate(Record):
     """Calibration with its provenance; missing provenance in format version 1 reads as None.
 
-    serial                  of the calibrated part
-    measured_on, valid_until  dates
-    by                      person who measured
-    report                  reference to the report
+    serial        of the calibrated part
+    measured_on   day of the calibration
+    valid_until   last day of its validity
+    by            person who measured
+    report        reference to the report
     """
 
     serial: int | str | None = None

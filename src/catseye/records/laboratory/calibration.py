@@ -17,6 +17,11 @@ class CalibratedQuantity(Record):
     """Quantity: key with its unit, value, standard uncertainty, and meaning.
 
     coverage   factor of u for an interval of 95.45 %; default 2
+    key        name, which ends in the unit
+    value      estimate
+    u          standard uncertainty
+    unit       of value and u; empty for a pure number
+    meaning    description, with its sign
     """
 
     key: Words
@@ -28,7 +33,11 @@ class CalibratedQuantity(Record):
 
 
 class CovarianceTable(Record):
-    """Full covariance matrix in the order of the keys, in the product of their units."""
+    """Full covariance matrix in the order of the keys, in the product of their units.
+
+    order    keys of the quantities
+    matrix   rows of the covariance matrix
+    """
 
     order: Annotated[tuple[str, ...], Field(strict=False)]
     matrix: Annotated[tuple[Annotated[tuple[float, ...], Field(strict=False)], ...], Field(strict=False)]
@@ -39,6 +48,11 @@ class DecisionTable(Record):
 
     least   True if the limit is a minimum, not a maximum
     grave   True if a failure rejects the result; else it makes it doubtful
+    name    of the test
+    statistic  value of the test statistic
+    limit   critical value
+    passed  true if the test passed
+    text    result as a sentence
     """
 
     name: Words
@@ -51,14 +65,42 @@ class DecisionTable(Record):
 
 
 class ReadingsTable(Record):
-    """Readings with residuals, as on the certificate."""
+    """Readings with residuals, as on the certificate.
+
+    columns   names
+    rows      cells of each reading, in the order of the columns
+    """
 
     columns: Annotated[tuple[str, ...], Field(strict=False)]
     rows: Annotated[tuple[Annotated[tuple[float | int | str, ...], Field(strict=False)], ...], Field(strict=False)]
 
 
 class CalibrationRecord(Record):
-    """Complete record; `record` holds the values to copy into the instrument's record."""
+    """Complete record; `record` holds the values to copy into the instrument's record.
+
+    kind                 kind of calibration
+    title                heading of the certificate
+    instrument           calibrated instrument
+    serial               serial number
+    measured_on          day of the readings
+    valid_until          last day of validity
+    by                   person who measured
+    report               reference to the report
+    made_by              program and version that wrote the record
+    verdict              good, doubtful or failed
+    variance_factor      of the adjustment; missing without degrees of freedom
+    degrees_of_freedom   readings less parameters
+    method               description of the calibration
+    notes                remarks, one a text
+    record               values to copy into the record of the instrument
+    quantity             calibrated quantities
+    covariance           of the quantities
+    decision             tests of the readings
+    plausible            limits of the instrument, tested
+    readings             table of the readings with residuals
+    inputs_sha256        SHA-256 of each input file by its name
+    sheet                keys of the sheet, as they were read
+    """
 
     format: Annotated[str, Version("calibration")]
     kind: Name

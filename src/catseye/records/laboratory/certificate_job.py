@@ -41,7 +41,11 @@ Bound = Annotated[float, Within(-1e12, 1e12)]
 
 
 class Signatory(Record):
-    """Person who signs: name, and the role beneath it."""
+    """Person who signs: name, and the role beneath it.
+
+    name   of the person
+    role   under the name
+    """
 
     name: Text
     role: Text
@@ -78,7 +82,12 @@ class LaboratoryRecord(Record):
 
 
 class Customer(Record):
-    """Customer of a calibration: name, address and contact."""
+    """Customer of a calibration: name, address and contact.
+
+    name      of the customer
+    address   lines of the address
+    contact   person or address to write to
+    """
 
     name: Text
     address: Lines = ()
@@ -89,7 +98,12 @@ Span = Annotated[tuple[float, float], Field(strict=False)]
 
 
 class WorkEnvironment(Record):
-    """Lowest and highest value during the work, and the standard uncertainty of each."""
+    """Lowest and highest value during the work, and the standard uncertainty of each.
+
+    temperature_c      lowest and highest temperature of the air
+    pressure_hpa       lowest and highest pressure
+    humidity_percent   lowest and highest relative humidity
+    """
 
     temperature_c: Span | None = None
     pressure_hpa: Span | None = None

@@ -114,7 +114,13 @@ class SurfacePlate(Record):
 
 
 class MeasuredPrism(Record):
-    """[left_prism] or [right_prism]: from the data sheet of the unit."""
+    """[left_prism] or [right_prism]: from the data sheet of the unit.
+
+    serial      serial number
+    height_mm   of the prism, corner to pole point
+    hrp_mm      fiducial point from the pole point
+    pc_mm       prism constant, negative
+    """
 
     serial: Annotated[int, Field(ge=1)]
     height_mm: Annotated[float, ReadingRange("mm", 10.0, 500.0)]
@@ -124,7 +130,13 @@ class MeasuredPrism(Record):
 
 
 class MeasuredBall(Record):
-    """[ball]: from the data sheet of the unit; u_r_mm of each radius."""
+    """[ball]: from the data sheet of the unit; u_r_mm of each radius.
+
+    r1_mm     radius of the small sphere
+    r2_mm     radius of the large sphere
+    u_r_mm    of each radius
+    pc_b_mm   range constant of the ball, negative
+    """
 
     r1_mm: Radius
     r2_mm: Radius
@@ -135,12 +147,21 @@ class MeasuredBall(Record):
 class Placement(Record):
     """[[placement]]: position of the unit on the range, prisms towards the ranger, then flipped.
 
-    spacer_mm         thickness in front of the rear stops
-    d_toppl_mm        scan point to back stops along their normal, minus l_post_mm and the spacer
-    h_s_mm            scan point (where the beam lands) above the line of the prisms
-    phi_*_rad         phases of left and right prism, reference, calibration, and of the ball after the flip
-    *_flipped_*       at the flip, if read again; default is the reading above
-    u_phase_rad       of each phase reading
+    spacer_mm                  thickness in front of the rear stops
+    d_toppl_mm                 scan point to back stops along their normal, minus l_post_mm and the spacer
+    h_s_mm                     scan point (where the beam lands) above the line of the prisms
+    phi_1_rad, phi_2_rad       phases of the left and of the right prism
+    phi_zrg_rad                phase of the reference prism
+    phi_cal_rad                phase of the zero distance
+    temperature_c              of the air
+    pressure_hpa               of the air
+    humidity_percent           of the air
+    phi_bcfp_rad               phase of the ball after the flip
+    phi_zrg_flipped_rad, phi_cal_flipped_rad  phases at the flip; without, the reading before it counts
+    temperature_flipped_c      of the air at the flip, likewise
+    pressure_flipped_hpa       of the air at the flip, likewise
+    humidity_flipped_percent   of the air at the flip, likewise
+    u_phase_rad                of each phase reading
     """
 
     spacer_mm: Annotated[float, Within(0, 2000)]
@@ -171,12 +192,24 @@ class Placement(Record):
 class TripletMeasurement(Certificate):
     """Complete file.
 
-    bk7_to_air_group_index_ratio   n, for which the glass constants are valid; its u as u_...
-    bk7_group_index                of the glass; if given, the delay in glass depends on each placement's air
-    d12_mm, u_d12_mm               between the prisms' fiducial points
-    u_lateral_mm                   ball centre against the prisms' midpoint, each direction in the plate
-    u_temperature_c and so on      of a reading's change between prisms and flip, without the thermometer's offset
-    u_d_toppl_mm, u_spacer_mm      coarse distance; thickness of a spacer
+    triplet                        name of the unit
+    measured_on                    day of the measurement
+    by                             person who measured
+    bk7_to_air_group_index_ratio   n, for which the glass constants are valid
+    bk7_group_index                of the glass; if given, the delay in glass depends on the air of each placement
+    modulation_hz                  frequency of the modulation
+    wavelength_um                  of the light in vacuum
+    air_model                      formula for the index of air
+    d12_mm, u_d12_mm               between the fiducial points of the prisms
+    u_lateral_mm                   ball centre from the midpoint of the prisms, each direction in the plate
+    u_temperature_c, u_pressure_hpa, u_humidity_percent  change of a reading between prisms and flip, without the
+                                   offset of the sensor
+    u_d_toppl_mm                   of the coarse distance d_toppl_mm
+    u_spacer_mm                    of the thickness of a spacer
+    surface_plate                  heights above the granite plate
+    left_prism, right_prism        data of the prisms
+    ball                           data of the ball
+    placement                      positions of the unit on the range
     """
 
     format: Annotated[int | str, Version(KIND)] = 1

@@ -92,7 +92,13 @@ class Signal(Record):
 
 
 class AcousticWeather(Record):
-    """Weather reading near the path; temperature only predicts the arrival."""
+    """Weather reading near the path; temperature only predicts the arrival.
+
+    mjd_utc            time
+    temperature_c      of the air
+    pressure_hpa       of the air
+    humidity_percent   relative humidity
+    """
 
     mjd_utc: Mjd
     temperature_c: Annotated[float, Within(-60, 60)]
@@ -101,7 +107,11 @@ class AcousticWeather(Record):
 
 
 class RecordingStart(Record):
-    """Time of the first sample of a file."""
+    """Time of the first sample of a file.
+
+    file            name of the file
+    start_mjd_utc   time of its first sample
+    """
 
     file: Annotated[str, Field(min_length=1)]
     start_mjd_utc: Mjd
@@ -127,6 +137,12 @@ class AcousticSheet(Certificate):
     speed_gradient_per_s, u_speed_gradient_per_s   change of the speed of sound across the path: rays bend
     frequency_hz           of the sound, for the air's dispersion; by default the signal's
     weighting, band_hz     of the correlation: "plain", "whitened", "phat"
+    interval_s             between two signals, longer than the window
+    shots                  number of signals in a file
+    signal                 reference signal
+    co2_ppm                carbon dioxide in the air
+    wavelength_um          of the light, for the group refractivity of the path
+    weather                readings near the path
     """
 
     format: Annotated[int | str, Version("acoustic")] = 1

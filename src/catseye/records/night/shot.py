@@ -22,7 +22,16 @@ SAMPLE_BYTES = 2
 
 
 class ShotRow(Record):
-    """Row of shots.csv: one range; `frame` is its buffer's row in frames.npy, counted from 0."""
+    """Row of shots.csv: one range; `frame` is its buffer's row in frames.npy, counted from 0.
+
+    shot                number, each once
+    mjd_utc             time of the trigger
+    ranger              name of the ranger
+    target              name of the retroreflector; `ZRG` is the internal cube of the ranger
+    cycles              of the intermediate frequency in the buffer
+    samples_per_cycle   samples in a cycle
+    frame               row of frames.npy, from 0
+    """
 
     shot: Annotated[int, Within(0, 2**53)]
     mjd_utc: Mjd

@@ -11,7 +11,14 @@ from catseye.records.files.record import Mjd, Name, Record, Within
 
 
 class WeatherSample(Record):
-    """Row of weather.csv; a millibar is a hectopascal."""
+    """Row of weather.csv; a millibar is a hectopascal.
+
+    mjd_utc         time
+    station         name of the station in site.toml
+    temperature_c   of the air
+    pressure_mb     of the air at the station
+    humidity_pct    relative humidity
+    """
 
     mjd_utc: Mjd
     station: Name

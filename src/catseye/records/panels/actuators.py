@@ -21,7 +21,11 @@ Place = Annotated[float, Within(-1e4, 1e4)]
 
 
 class ActuatorPosition(Record):
-    """Row of positions.csv: an actuator's travel from its middle, positive towards the focus."""
+    """Row of positions.csv: an actuator's travel from its middle, positive towards the focus.
+
+    actuator      name of the actuator
+    position_mm   travel from its middle
+    """
 
     actuator: Name
     position_mm: Travel
@@ -38,6 +42,7 @@ class ActuatorCorrection(Record):
     within_limits              True if the target is
     prisms, weight             the three prisms with the largest weights, joined by spaces, and their sum of weights
     how                        "measured": it has its own prism; "foretold": predicted without one
+    actuator                   name of the actuator
     """
 
     actuator: Name

@@ -20,6 +20,7 @@ class PanelGauge(Record):
     zero_um_per_c   increase of the reading per °C above the flat's temperature
     sag_um          sag of the tip with the tool upright, compared with weightless
     linearity       pairs of a reading in mm and its correction in µm, to be added; sorted, linear between
+    name            a, b, c or d: one in each quarter of the tool
     """
 
     name: Literal["a", "b", "c", "d"]
@@ -57,7 +58,12 @@ class PanelPrior(Record):
 
 
 class PanelScrew(Record):
-    """[screw]: effect of a turn; `u_turn` is the uncertainty of a turn, in turns."""
+    """[screw]: effect of a turn.
+
+    pitch_mm    travel of a full turn
+    clockwise   effect of a turn clockwise on the corner
+    u_turn      standard uncertainty of a turn, in turns
+    """
 
     pitch_mm: Annotated[float, Within(0.05, 20)]
     clockwise: Literal["raises", "lowers"]
@@ -67,17 +73,22 @@ class PanelScrew(Record):
 class PanelInstrument(Certificate):
     """Complete SHEET.toml.
 
-    u_gauge_um         repeatability of one reading, with repositioning
-    resolution_um      last digit of a reading
-    travel_mm          of a gauge; readings beyond are refused
-    u_zero_um          of a gauge's zero within a session
-    u_flat_um          of the flat under one gauge
-    u_lean_arcsec      of one reading of an inclinometer
-    u_level_arcsec     of an inclinometer's zero in a session, including the telescope's tilt
-    lean_limit_arcmin  largest lean of the shaft; over root three, u of an unread lean
-    flat_temperature_c at which the gauges were zeroed
-    u_stand_um         of the shaft's shoulder below its prism, contained in surveyed heights of prisms
-    goal_um            tolerance of a corner from its neighbours' mean
+    name                 of the tool
+    u_gauge_um           repeatability of one reading, with repositioning
+    resolution_um        last digit of a reading
+    travel_mm            of a gauge; a reading beyond half of it is refused
+    u_zero_um            drift of the zero of a gauge within a session
+    u_flat_um            of the flat under one gauge
+    u_lean_arcsec        of one reading of an inclinometer
+    u_level_arcsec       of the zero of an inclinometer in a session, including the tilt of the telescope
+    lean_limit_arcmin    largest lean of the shaft; placements beyond are named; over root three, u of an unread
+                         lean
+    flat_temperature_c   temperature at which the gauges were zeroed
+    u_stand_um           of the shoulder of the shaft below its prism, added to surveyed heights
+    goal_um              tolerance of a corner from the mean of its neighbours
+    gauge                four displacement gauges
+    panel                prior knowledge of the panels
+    screw                effect of a turn
     """
 
     format: Annotated[str, Version("panel-instrument")]

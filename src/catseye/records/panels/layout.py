@@ -26,6 +26,8 @@ class PanelCorner(Record):
     place              1 to 4, in order around the panel, from x to y
     x_mm, y_mm         of the corner, reflector frame; the same in every row of a corner
     design_offset_um   of this panel's surface at the corner from the paraboloid, by design
+    panel              name of the panel
+    corner             name of the actuator under the corner
     """
 
     panel: Name

@@ -33,14 +33,15 @@ COMMON = {"kind", "name", "aperture_radius_mm", "transmission"}
 class Laser(Record):
     """[laser]: x and y planes; waist as radius at 1/e^2, or from the full angle at half maximum.
 
-    power_mw                 mean
-    waist_*_um               radius at 1/e^2
-    divergence_*_deg         full angle at half maximum, as in data sheets of diodes; instead of the waist
-    astigmatism_um           depth of the waist of x in the laser beyond that of y, which is at 0
-    quality_*                M^2
-    polarization             axis of the field; after an isolator it is rotated by 45 degrees
-    back_reflection          share of the emitted power that returns to the isolator, from all sources
-    regulation_rad           phase per relative change of the power; see `signal.systematics.feedback`
+    power_mw                             mean power
+    waist_x_um, waist_y_um               radius at 1/e^2
+    divergence_x_deg, divergence_y_deg   full angle at half maximum, as in data sheets of diodes; instead of the
+                                         waist
+    astigmatism_um                       depth of the waist of x in the laser beyond that of y, which is at 0
+    quality_x, quality_y                 beam quality M^2
+    polarization                         axis of the field; after an isolator it is rotated by 45 degrees
+    back_reflection                      share of the emitted power that returns to the isolator, from all sources
+    regulation_rad                       phase per relative change of the power; see `signal.systematics.feedback`
     """
 
     power_mw: Annotated[float, Within(1e-6, 1e5)]
@@ -71,16 +72,21 @@ class BeamElement(Record):
     """[[outward]], [[inward]]: optical element, in the order of the light.
 
     kind                 space, lens, thick_lens, mirror, plate, aperture, splitter, isolator
+    name                 for tables and figures
     aperture_radius_mm   of any element: light outside is lost
-    transmission         of any element, without a mirror's coating
+    transmission         of any element, without the coating of a mirror
     length_mm            of a space, in air
-    focal_length_mm      of a thin lens; acts = "x" or "y" for a cylindrical one
-    r1_mm, r2_mm         of a thick lens, positive if the centre is behind; flat by default
-    thickness_mm, glass  of a thick lens or a plate
+    focal_length_mm      of a thin lens
+    acts                 of a thin lens: "x" or "y" for a cylindrical one
+    r1_mm, r2_mm         radii of a thick lens, positive if the centre is behind; flat by default
+    thickness_mm         of a thick lens or a plate
+    glass                of a thick lens or a plate, by its name in `catseye glass`
     radius_mm            of a mirror, positive if concave; flat by default
-    incidence_deg        on a mirror or a plate; `plane` is the axis that lies in the plane of incidence
-    coating              of a mirror, by its name in `optics.coating`
-    turn_deg, leak       of an isolator: rotation by its rotator, leakage of each polarizer
+    incidence_deg        on a mirror or a plate
+    plane                axis in the plane of incidence
+    coating              of a mirror, by its name in `catseye plot coating`
+    turn_deg             rotation by the rotator of an isolator
+    leak                 leakage of each polarizer of an isolator
     """
 
     kind: Kind
@@ -121,6 +127,7 @@ class ReflectorRecord(Record):
 
     radius_mm     of its clear aperture
     reflectance   of all its surfaces
+    name          for tables and figures
     """
 
     name: str = ""
@@ -131,10 +138,12 @@ class ReflectorRecord(Record):
 class Detector(Record):
     """[detector]: a round photodiode after the last inward element.
 
-    radius_mm                     of the active disc
-    offset_um, u_offset_um        of the image from its centre, and the standard uncertainty of each coordinate
-    spot_um                       radius of the image at 1/e^2; by default from the beam
-    sheet_resistance_ohm          per square; with capacitance_pf the delay across the disc: `optics.detector`
+    radius_mm              of the active disc
+    offset_um              of the image from the centre of the disc
+    u_offset_um            standard uncertainty of each coordinate of that offset
+    spot_um                radius of the image at 1/e^2; by default from the beam
+    sheet_resistance_ohm   per square; gives with capacitance_pf the delay across the disc
+    capacitance_pf         of the disc
     """
 
     radius_mm: Size
@@ -167,6 +176,12 @@ class BeamTrain(Certificate):
     modulation_hz    of its amplitude
     distance_m       from the last outward element to the reflector and from it to the first inward one
     distances_m      for the table of returned power; by default a doubling series around distance_m
+    name             title of the train
+    laser            source
+    outward          elements from the laser to the reflector, in order
+    reflector        retroreflector
+    inward           elements from the reflector to the detector, in order
+    detector         photodiode
     """
 
     format: Annotated[int | str, Version("beam")]

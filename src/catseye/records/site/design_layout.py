@@ -28,6 +28,9 @@ class PointSet(Record):
                      radius radius_m sqrt((k + 1/2) / n), k golden angles after first_deg, as a sunflower's seeds
     centre_m         x, y, z
     focal_length_m   z rises by r^2 / 4 f above the centre's: a paraboloid; without, all are level
+    count            number of points
+    radius_m         of the ring or disc
+    first_deg        angle of the first point, from x towards y
     """
 
     name: Name
@@ -70,6 +73,7 @@ class TargetSet(PointSet):
     """[[targets]]: retroreflectors on the structure, of a kind without an axis.
 
     u_mm   of each coordinate before it is measured
+    type   kind of the retroreflectors
     """
 
     type: SingleRetroreflectorName = "hollow"
@@ -83,7 +87,14 @@ class TargetSet(PointSet):
 
 
 class DesignRanges(Record):
-    """[ranges]: a range's u, u_mm and u_ppm squared and added; the air's common scale; distances that are used."""
+    """[ranges]: a range's u, u_mm and u_ppm squared and added; the air's common scale; distances that are used.
+
+    u_mm        constant part of the standard uncertainty of a range
+    u_ppm       proportional part; both parts are added as squares
+    u_air_ppm   scale of the air, common to all ranges
+    near_m      least distance that is used
+    far_m       largest distance that is used
+    """
 
     u_mm: Annotated[float, Within(0, 100, above=True)]
     u_ppm: Annotated[float, Within(0, 100)]
@@ -99,7 +110,14 @@ class DesignRanges(Record):
 
 
 class DesignLayout(Certificate):
-    """Complete file of a structure to be designed."""
+    """Complete file of a structure to be designed.
+
+    name          of the structure
+    description   title of the report
+    ranges        uncertainty and reach of ranges
+    rangers       sets of rangers
+    targets       sets of retroreflectors
+    """
 
     format: Annotated[int | str, Version("design")] = 1
     name: Name

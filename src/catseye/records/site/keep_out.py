@@ -21,6 +21,7 @@ class KeepOutBox(Record):
     centre_mm, size_mm   alternative to the corners
     turn_deg             rotation about its vertical middle axis, from x towards y
     why                  protected object, repeated in refusals
+    name                 of the box
     """
 
     name: Name
@@ -80,7 +81,11 @@ class KeepOutBox(Record):
 
 
 class SunCone(Record):
-    """[sun]: the half angle of its cone, and the altitude below which it is set."""
+    """[sun]: the half angle of its cone, and the altitude below which it is set.
+
+    half_angle_deg   half angle of the cone about the Sun that no beam may enter
+    horizon_deg      altitude below which the Sun has set
+    """
 
     half_angle_deg: Annotated[float, Within(0.5, 60)] = 5.0
     horizon_deg: Annotated[float, Within(-90, 0)] = -2.0
@@ -91,6 +96,8 @@ class KeepOut(Certificate):
 
     beam_length_m   boxes further from a scan point are ignored; by default the beam is infinite
     margin_counts   deviation of azimuth and elevation axis from their profile, including a later start of one
+    sun             cone about the Sun
+    box             boxes that no beam may enter
     """
 
     format: Annotated[int | str, Version("keep-out")] = 1

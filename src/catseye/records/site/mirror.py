@@ -43,6 +43,52 @@ PAIRED = (
 class MirrorGeometry(Certificate):
     """Mirror data required for pointing; ranging data may be missing.
 
+    zp                                 name of the mirror
+    laser_number, detector_number      parts of the head
+    head_number, oscillator_number     parts of the head
+    leakage_amplitude_volt, leakage_phase_rad  phasor that leaks into every shot
+    u_leakage_volt                     of each quadrature of the leakage
+    d0_mm                              straight from the scan point to the internal reference cube
+    dx_mm, dy_mm, dz_mm                scan point from the Kelvin fixed point, mount's axes
+    u_offset_mm                        of each of these three
+    beta1_rad, beta2_rad               small rotations of the mirror's axes about x and y of the mount
+    u_beta_rad                         of each of these two
+    axis_offset_mm                     elevation axis from the azimuth axis, positive along the azimuth of the beam
+    mirror_offset_mm                   reflecting face from the elevation axis, positive along its outward normal
+    beam_x_mm, beam_y_mm               laser beam from the azimuth axis where it meets the mirror, mirror's axes at
+                                       Theta = 0
+    u_axis_mm                          of each of these four
+    face_tilt_rad                      of the face's outward normal from the plane across the elevation axis,
+                                       towards the axis's y end (y of the mirror's axes at Theta = 0)
+    beam_tilt_x_rad, beam_tilt_y_rad   x and y of the direction opposite to the incoming laser beam; z is nearly 1
+    u_tilt_rad                         of each of these three
+    detector_defocus_mm                of the detector, for the record
+    beam_divergence_rad                of the beam, for the record
+    amplitude_to_phase_rad             increase of the measured phase per factor e of amplitude above that of the
+                                       reference shots
+    cyclic_cosine_mm, cyclic_sine_mm   of the range error (too long), orders 1, 2, ... of the phase after the
+                                       electronics'
+    u_cyclic_mm                        of each of these terms; alone it means orders 1 and 2, expected zero
+    na0, ne0                           encoder counts of azimuth and elevation at zero
+    u_zero_counts                      of each of these two
+    azimuth_encoder_cosine_counts, azimuth_encoder_sine_counts  orders 1, 2, ... of the encoder's error, positive if
+                                       it reads too high: waves of the axis's angle from its zero
+    elevation_encoder_cosine_counts, elevation_encoder_sine_counts  the same of the elevation encoder, in the
+                                       mirror's own angle, half of Phi
+    u_encoder_counts                   of each of these terms
+    az_low_limit, az_high_limit        counts of the azimuth stops, both allowed
+    azm_zrg, elv_zrg                   counts that point at the internal cube
+    abv_0, abv_1                       greatest velocity of axis 0 (azimuth) and 1 (elevation), integers of the
+                                       motion chip: counts a sample times 65 536
+    aba_0, aba_1                       acceleration of each axis, counts a sample squared times 65 536
+    fkp_0, fkp_1                       proportional gain of the servo
+    fki_0, fki_1                       integral gain of the servo
+    fkd_0, fkd_1                       derivative gain of the servo
+    fil_0, fil_1                       limit of the integral
+    fsi_0, fsi_1                       interval of the derivative, samples
+    erl_0, erl_1                       greatest following error, counts
+    notes                              NOTES of the report
+
     dx_mm, dy_mm, dz_mm scan point from the Kelvin fixed point, mount's axes, with u_offset_mm each
     beta1_rad, beta2_rad  small rotations about x and y, with u_beta_rad each
     na0, ne0            encoder counts at zero, with u_zero_counts each

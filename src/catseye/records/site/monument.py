@@ -30,14 +30,21 @@ Text = Annotated[str, Field(min_length=1)]
 class MonumentGeometry(Certificate):
     """Monument data required for pointing; the survey's u and the geographic place may be missing.
 
-    monument            the ranger's name, zp its mirror
-    x_mm, y_mm, z_mm    Kelvin fixed point, ground frame, with u_x_mm, u_y_mm, u_z_mm (0: held fixed)
-    azimuth_deg         survey azimuth, clockwise from north, of the line fixed point to v-block
-    alpha1_rad          pi - azimuth, about y^; alpha2_rad about z^, alpha3_rad about x^; u_alpha1_rad and so on
-    latitude_deg, longitude_deg (east positive, NAD83), elevation_m (above sea level)
-    wv_x_m, wv_y_m, wv_z_m  West Virginia South state plane (NAD83): easting, northing, and elevation
+    monument                 the ranger's name
+    zp                       name of its mirror
     control_panel, ethernet_address, ip_address  of the ranger's cabinet
-    notes               NOTES of the report
+    x_mm, y_mm, z_mm         Kelvin fixed point, ground frame
+    u_x_mm, u_y_mm, u_z_mm   of each coordinate; 0: held fixed
+    azimuth_deg              survey azimuth, clockwise from north, of the line from fixed point to v-block
+    alpha1_rad               pi - azimuth, about y^
+    alpha2_rad               about z^, positive: x^ rises
+    alpha3_rad               about x^, positive: z^ (the v-block) sinks
+    latitude_deg             of the monument, NAD83
+    longitude_deg            of the monument, NAD83, east positive
+    elevation_m              above sea level
+    wv_x_m, wv_y_m           West Virginia South state plane (NAD83): easting, northing
+    wv_z_m                   elevation of the monument by the survey
+    notes                    NOTES of the report
     """
 
     format: Annotated[int | str, Version("monument")] = 1

@@ -29,6 +29,7 @@ class PointingModel(Certificate):
     covariance_arcsec2  rows in the same order; none if unknown
     sky_rms_arcsec      of the fit, if any
     verdict, why        of the fit if not good, and then of predictions
+    name                of the series
     """
 
     format: Literal["catseye-pointing-series-1"]

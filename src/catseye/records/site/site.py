@@ -26,7 +26,13 @@ PositiveMillimetres = Annotated[float, Within(500, 1e6)]
 
 
 class PostureRecord(Record):
-    """[campaign]: time and position of the telescope."""
+    """[campaign]: time and position of the telescope.
+
+    name            of the campaign, or of the site
+    start_mjd_utc   time of the start
+    azimuth_deg     of the telescope, clockwise from north
+    elevation_deg   of the telescope
+    """
 
     name: str = Field(min_length=1)
     start_mjd_utc: Mjd
@@ -35,7 +41,12 @@ class PostureRecord(Record):
 
 
 class Location(Record):
-    """[site]: longitude east positive; elevation of the ground frame's z = 0 above sea level."""
+    """[site]: longitude east positive; elevation of the ground frame's z = 0 above sea level.
+
+    latitude_deg        of the pintle bearing, north positive
+    longitude_deg       of the pintle bearing, east positive
+    elevation_of_z0_m   of the ground frame's z = 0 above sea level
+    """
 
     latitude_deg: Latitude
     longitude_deg: Annotated[float, Within(-180, 360)]
@@ -43,13 +54,21 @@ class Location(Record):
 
 
 class GroundFrame(Record):
-    """[frames.ground]: x east, y north, z up."""
+    """[frames.ground]: x east, y north, z up.
+
+    description   text, for people
+    """
 
     description: str
 
 
 class ReflectorFrame(Record):
-    """[frames.reflector]: z along the paraboloid's axis, and its nominal transformation to ground."""
+    """[frames.reflector]: z along the paraboloid's axis, and its nominal transformation to ground.
+
+    description                 text, for people
+    reflector_to_elevation_mm   vector from the vertex to the elevation axis, reflector frame
+    elevation_axis_height_mm    of the elevation axis above z = 0
+    """
 
     description: str
     reflector_to_elevation_mm: Annotated[Vector, Length(100, 1e6, or_zero=True)]
@@ -57,14 +76,23 @@ class ReflectorFrame(Record):
 
 
 class Frames(Record):
-    """[frames]: the two frames of all positions."""
+    """[frames]: the two frames of all positions.
+
+    ground      ground frame
+    reflector   reflector frame
+    """
 
     ground: GroundFrame
     reflector: ReflectorFrame
 
 
 class ParaboloidRecord(Record):
-    """[paraboloid]: the design surface; its aperture in the reflector frame's x and y."""
+    """[paraboloid]: the design surface; its aperture in the reflector frame's x and y.
+
+    focal_length_mm      of the parent paraboloid
+    aperture_centre_mm   x, y of the middle of the aperture
+    aperture_radius_mm   of the aperture
+    """
 
     focal_length_mm: PositiveMillimetres
     aperture_centre_mm: Annotated[Pair, Length(500, 1e6, or_zero=True)]
@@ -74,8 +102,14 @@ class ParaboloidRecord(Record):
 class Ranging(Record):
     """[ranging]: the modulation, and typical noise of electronics and air.
 
-    bk7_to_air_phase_index_ratio   refracts oblique light, if given; else the group index, as in
-                                   appendix B of the triplet memo (0.4 um at 30 degrees)
+    modulation_hz                  frequency of the modulation
+    if_hz                          intermediate frequency of the samples
+    wavelength_um                  of the light in vacuum
+    bk7_to_air_group_index_ratio   group index of BK 7 over that of air
+    bk7_to_air_phase_index_ratio   refracts oblique light, if given; else the group index, as in appendix B of the
+                                   triplet memo (0.4 um at 30 degrees)
+    electronic_drift_mrad_per_sqrt_hour  random walk of the phase of the electronics
+    path_index_fluctuation_ppm     departure of a path from smooth air
     """
 
     modulation_hz: Annotated[float, Within(1e6, 1e11)]
@@ -88,7 +122,13 @@ class Ranging(Record):
 
 
 class Adc(Record):
-    """[adc]: the converter; code 32768 corresponds to full_scale_volt."""
+    """[adc]: the converter; code 32768 corresponds to full_scale_volt.
+
+    bits                of the converter
+    full_scale_volt     voltage of code 32768
+    samples_per_cycle   samples in a cycle of the intermediate frequency
+    cycles              of a buffer
+    """
 
     bits: Annotated[int, Within(8, 16)]
     full_scale_volt: Annotated[float, Within(0.01, 1000)]
@@ -106,6 +146,8 @@ class WeatherStation(Record):
     """[[weather_station]]: elevation above sea level, place in ground frame.
 
     x_m, y_m   east and north of the pintle bearing; unknown if missing
+    name       of the station
+    elevation_m  of its sensors above sea level
     """
 
     name: Name
@@ -131,7 +173,17 @@ class InCommon(Record):
 
 
 class SiteRecord(Certificate):
-    """Complete content of site.toml."""
+    """Complete content of site.toml.
+
+    campaign          time and posture
+    site              geographic place
+    frames            frames of all positions
+    paraboloid        design surface of the dish
+    ranging           modulation and typical noise
+    in_common         uncertainties common to records of one kind
+    adc               converter
+    weather_station   weather stations
+    """
 
     format: Annotated[int | str, Version("site")] = 1
     campaign: PostureRecord

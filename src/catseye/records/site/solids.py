@@ -33,7 +33,11 @@ Thickness = Annotated[float, Within(0, 1e4)]  # mm
 
 
 class SolidRecord(Record):
-    """Keys of all kinds: a name and a frame."""
+    """Keys of all kinds: a name and a frame.
+
+    name    of the solid
+    frame   frame of its coordinates, with which it moves
+    """
 
     name: Words
     frame: SolidFrame
@@ -44,7 +48,12 @@ class SolidRecord(Record):
 
 
 class BoxRecord(SolidRecord):
-    """[[box]]: centre_mm, size_mm (full lengths), turn_deg of its x axis about the frame's z, right-handed."""
+    """[[box]]: a box.
+
+    centre_mm   middle of the box
+    size_mm     full lengths along its x, y and z
+    turn_deg    of its x axis about the z of the frame, right-handed
+    """
 
     centre_mm: Vector
     size_mm: Annotated[tuple[Size, Size, Size], Field(strict=False)]
@@ -55,7 +64,11 @@ class BoxRecord(SolidRecord):
 
 
 class SphereRecord(SolidRecord):
-    """[[sphere]]: centre_mm, radius_mm."""
+    """[[sphere]]: a sphere.
+
+    centre_mm   centre
+    radius_mm   radius
+    """
 
     centre_mm: Vector
     radius_mm: Radius
@@ -65,7 +78,11 @@ class SphereRecord(SolidRecord):
 
 
 class CylinderRecord(SolidRecord):
-    """[[cylinder]]: from_mm to to_mm, centres of its flat ends, radius_mm."""
+    """[[cylinder]]: a cylinder.
+
+    from_mm, to_mm   centres of its flat ends
+    radius_mm        radius
+    """
 
     from_mm: Vector
     to_mm: Vector
@@ -82,7 +99,11 @@ class CylinderRecord(SolidRecord):
 
 
 class ConeRecord(SolidRecord):
-    """[[cone]]: from_mm to to_mm with from_radius_mm and to_radius_mm, one of which may be 0, a point."""
+    """[[cone]]: a cone, cut or whole.
+
+    from_mm, to_mm                 centres of its flat ends
+    from_radius_mm, to_radius_mm   radii of these ends; one of them may be 0, a point
+    """
 
     from_mm: Vector
     to_mm: Vector
@@ -105,7 +126,10 @@ class ConeRecord(SolidRecord):
 class DishRecord(SolidRecord):
     """[[dish]]: piece of the paraboloid z = (x^2 + y^2)/4f about the frame's z axis, vertex at its origin.
 
-    focal_length_mm; aperture_centre_mm (x, y) and aperture_radius_mm; below_mm and above_mm the thickness along z
+    focal_length_mm      of the paraboloid
+    aperture_centre_mm   x, y of the middle of its aperture
+    aperture_radius_mm   of the aperture
+    below_mm, above_mm   thickness along z, below and above the surface
     """
 
     focal_length_mm: Annotated[float, Within(500, 1e6)]
@@ -126,6 +150,12 @@ class DishRecord(SolidRecord):
 
 class Solids(Certificate):
     """Complete solids.toml: any number of each kind, with unique names.
+
+    box        boxes
+    sphere     spheres
+    cylinder   cylinders
+    cone       cones
+    dish       pieces of a paraboloid
 
     >>> Solids(format="catseye-solids-1").all
     ()

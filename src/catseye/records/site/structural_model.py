@@ -43,7 +43,12 @@ RangeC = Annotated[tuple[Celsius, Celsius], Field(strict=False)]
 
 
 class Basis(Record):
-    """Functions of posture: `terms`, or knots `elevation_deg` and optionally `temperature_c` of a table."""
+    """Functions of posture: `terms`, or knots `elevation_deg` and optionally `temperature_c` of a table.
+
+    terms           functions of elevation and temperature, by name; instead of a table
+    elevation_deg   knots of a table
+    temperature_c   knots of a table, in addition
+    """
 
     terms: Annotated[tuple[str, ...], Field(strict=False, min_length=1)] | None = None
     elevation_deg: Annotated[tuple[Degrees, ...], Field(strict=False, min_length=1)] | None = None
@@ -99,6 +104,8 @@ class MotionRecord(Basis):
     u_shift_mm      standard uncertainty of each shift in any one posture, independent each time: the model's residual
     u_turn_arcsec   of each rotation
     covariance      of all coefficients, mm and arc seconds, component by component in the order of the keys; 6 k rows
+    shift_x_mm, shift_y_mm, shift_z_mm  coefficients of the shift along each axis, or its values at the knots
+    turn_x_arcsec, turn_y_arcsec, turn_z_arcsec  of the rotation about each axis, likewise
     """
 
     pivot_mm: Place
@@ -131,6 +138,8 @@ class FrameRecord(Record):
 
     parent      frame that carries it
     origin_mm   origin in the parent's axes
+    name        of the frame
+    motion      of the frame; at rest without
     """
 
     name: Name
@@ -140,7 +149,13 @@ class FrameRecord(Record):
 
 
 class PointRecord(Record):
-    """Point of a group, in the frame of the group; shifts by the group's basis."""
+    """Point of a group, in the frame of the group; shifts by the group's basis.
+
+    name                                 of the point
+    position_mm                          in the nominal posture
+    u_position_mm                        of each coordinate
+    shift_x_mm, shift_y_mm, shift_z_mm   coefficients or values of its own shift
+    """
 
     name: Name
     position_mm: Place
@@ -157,6 +172,8 @@ class GroupRecord(Record):
     motion       of all of them, in addition to the frame's
     shifts       functions of posture with values in each point
     u_shift_mm   residual u of each coordinate in any one posture; with `shifts` only
+    name         of the group
+    point        points of the group
     """
 
     name: Name
@@ -190,6 +207,7 @@ class VibrationRecord(Record):
     frequency_hz, u_frequency_hz, damping_ratio   of the mode
     shift_per_x, shift_per_y                      m of shift per metre on the detector in x, in y
     turn_arcsec_per_mm_x, turn_arcsec_per_mm_y    rotation likewise
+    name                 of the mode
     """
 
     name: Name
@@ -204,7 +222,16 @@ class VibrationRecord(Record):
 
 
 class StructuralModel(Certificate):
-    """Complete structural model; outside its ranges refused, not extrapolated."""
+    """Complete structural model; outside its ranges refused, not extrapolated.
+
+    title                     of the model
+    elevation_deg             least and greatest elevation for which it holds
+    temperature_c             least and greatest temperature for which it holds
+    reference_temperature_c   temperature at which the thermal terms are zero
+    frame                     frames that move
+    group                     groups of points
+    vibration                 vibration modes
+    """
 
     format: Annotated[int | str, Version("structural-model")] = 1
     title: str = Field(min_length=1)

@@ -21,12 +21,16 @@ PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each 
 class TargetRow(Record):
     """Single retroreflector; its kind says which keys it has.
 
-    position_mm     approximate, in the named frame
-    u_position_mm   of each coordinate; by default the reduction's setting, 10 mm
-    normal          outward axis, same frame, of a kind that has one: normal of a prism's entry face
-    material        of a prism
-    height_mm, u_height_mm   of the prism; hrp_mm from the entry face down to the reference point
-    pc_mm           prism constant, negative
+    name                     of the target, each once
+    type                     kind of retroreflector
+    frame                    frame of its position, with which it moves
+    position_mm              approximate, in the named frame
+    u_position_mm            of each coordinate; by default the reduction's setting, 10 mm
+    normal                   outward axis, same frame, of a kind that has one: normal of a prism's entry face
+    material                 of a prism
+    height_mm, u_height_mm   of a prism, from the corner to the entry face
+    hrp_mm                   from the entry face of a prism down to the reference point
+    pc_mm                    prism constant, negative
     """
 
     name: Name
@@ -68,7 +72,10 @@ class TargetRow(Record):
 
 
 class Targets(Record):
-    """Complete content of targets.toml."""
+    """Complete content of targets.toml.
+
+    target   retroreflectors
+    """
 
     format: Annotated[int | str, Version("targets")] = 1
     target: Annotated[tuple[TargetRow, ...], Field(strict=False)]
@@ -79,6 +86,9 @@ class FeedArmRanger(Record):
 
     u_position_mm   of each coordinate of the scan point; by default the reduction's setting, 10 mm
     mount_z, mount_y  directions of the mount's z^ (fixed point to v-block) and y^ (up), reflector frame; both or none
+    name            of the ranger
+    zp              name of its mirror
+    nominal_scan_point_mm  nominal position of the scan point
     """
 
     name: Name
@@ -104,13 +114,20 @@ class FeedArmRanger(Record):
 
 
 class AimPoint(Record):
-    """Point A, which the triplets face, in the reflector frame."""
+    """Point A, which the triplets face, in the reflector frame.
+
+    nominal_mm   nominal position
+    """
 
     nominal_mm: Position
 
 
 class FeedArm(Record):
-    """Complete content of feedarm.toml."""
+    """Complete content of feedarm.toml.
+
+    ranger      rangers of the feed arm
+    aim_point   point that the triplets face
+    """
 
     format: Annotated[int | str, Version("feedarm")] = 1
     ranger: Annotated[tuple[FeedArmRanger, ...], Field(strict=False)]
@@ -118,7 +135,13 @@ class FeedArm(Record):
 
 
 class BenchmarkRow(Record):
-    """Row of benchmarks.csv: certified distance from a ranger's scan point to a target."""
+    """Row of benchmarks.csv: certified distance from a ranger's scan point to a target.
+
+    target                  name of the retroreflector
+    ranger                  name of the ranger
+    certified_distance_mm   distance by its certificate
+    u_mm                    standard uncertainty of the distance
+    """
 
     target: Name
     ranger: Name

@@ -30,7 +30,14 @@ Small = Annotated[float, Within(-20, 20)]  # mm
 
 
 class TripletPrism(Record):
-    """[left_prism] or [right_prism]."""
+    """[left_prism] or [right_prism].
+
+    target      name of the prism as a target
+    serial      serial number
+    height_mm   of the prism, from the corner to the entry face
+    hrp_mm      from the entry face down to the reference point
+    pc_mm       prism constant, negative
+    """
 
     target: Name
     serial: int | str
@@ -51,7 +58,14 @@ class TripletPrism(Record):
 
 
 class TripletBall(Record):
-    """[ball]: the cat's-eye, radii r1_mm of the small and r2_mm of the large sphere, u_r_mm each."""
+    """[ball]: the cat's-eye of two spheres.
+
+    target    name of the ball as a target
+    r1_mm     radius of the small sphere
+    r2_mm     radius of the large sphere
+    u_r_mm    of each radius
+    pc_b_mm   range constant of the ball, negative
+    """
 
     target: Name
     r1_mm: Annotated[float, Within(5, 1000)]
@@ -82,6 +96,10 @@ class TripletRecord(Certificate):
     h_corr_mm               ball centre above the prisms' midpoint along normal, with u_h_corr_mm
     l_mpbc_mm               the same from the surface plate, with u_l_mpbc_mm
     u_lateral_mm            ball centre against the midpoint, each direction in the plate
+    triplet                 name of the unit
+    frame                   frame of its position, with which it moves
+    left_prism, right_prism  prisms
+    ball                    cat's-eye
     """
 
     format: Annotated[int | str, Version("triplet")] = 1

@@ -46,15 +46,20 @@ Spread = Annotated[float, Within(0, 100)]
 class PathSheet(Certificate):
     """Data sheet of a refractometer path; `FILE.toml` beside `FILE.csv`.
 
-    path                     its name
-    path_length_m            D - D0, less the glass of the target
-    u_path_length_mm         of it; 25 mm suffice for changes, the absolute index needs micrometres
-    modulation_hz, wavelength_um, air_model, co2_ppm   as for the index of air
-    u_temperature_c          of each thermometer's offset, common to all its readings; a list has one per thermometer
-    u_pressure_hpa, u_humidity_percent   likewise
-    noise_temperature_c      scatter of a reading against the path's mean, and so on
-    u_phase_rad              of a phase, if the table has no column of that name
-    drift_mrad_per_root_hour of the electronics or the path, a random walk; 0: none
+    path                                 name of the path
+    path_length_m                        D - D0, less the glass of the target
+    u_path_length_mm                     of the length; 25 mm suffice for changes, the absolute index needs
+                                         micrometres
+    modulation_hz                        frequency of the modulation
+    wavelength_um                        of the light in vacuum
+    air_model                            formula for the index of air
+    co2_ppm                              carbon dioxide in the air
+    u_temperature_c                      of each thermometer's offset, common to all its readings; a list has one
+                                         per thermometer
+    u_pressure_hpa, u_humidity_percent   of the sensor's offset, likewise
+    noise_temperature_c, noise_pressure_hpa, noise_humidity_percent  scatter of a reading about the path's mean
+    u_phase_rad                          of a phase, if the table has no column of that name
+    drift_mrad_per_root_hour             random walk of the electronics or the path; 0: none
     """
 
     format: Annotated[int | str, Version("refractometer")] = 1

@@ -291,7 +291,7 @@ def _air(scene: ShotScene) -> list[Item]:
             Input("air that no station reads", 0.0, field.u_unread(scene.path)[0] / PPM),
             "ppm",
             by_index * PPM,
-            "experience, without the ranges: docs/decisions/0017-air-as-a-process.md",
+            "experience, without the ranges: catseye help decisions/0017-air-as-a-process",
         ),
         Item(
             "fluctuation",

@@ -11,13 +11,14 @@ import numpy as np
 from catseye.aliases import Progress
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.records.site.folder import SiteFolder
+from catseye.estimation.shapes.paraboloid import ParaboloidStatus
 from catseye.reduction.site.posture import SURE, largest_correction
 from catseye.reduction.surface.actuators import Actuators, Travel, actuators_of, corrections
 from catseye.reduction.surface.change import Change, change_between
+from catseye.reduction.surface.dish import DishDesign
 from catseye.reduction.surface.lookup import Lookup, lookup_of
-from catseye.reduction.surface.placement import TRAVEL, DishPlacement, design_places, placement_of
-from catseye.reduction.surface.shape import LitAperture, Prisms, ShapeSettings, SurfaceShape, shape_of
+from catseye.reduction.surface.placement import DishPlacement, placement_of
+from catseye.reduction.surface.shape import Prisms, ShapeSettings, SurfaceShape, fitted_frame, shape_of
 from catseye.verdict import Verdict
 
 LARGEST_FACTOR = 2.0  # variance factor of a look-up table's model beyond which its epochs disagree
@@ -29,9 +30,11 @@ class SurfaceFindings:
 
     An epoch, a change, a look-up table; perhaps actuators.
 
-    placements   of each shape's prisms on the site's dish
+    dish         design
+    placements   of each shape's points on it
     """
 
+    dish: DishDesign
     shapes: tuple[SurfaceShape, ...]
     change: Change | None = None
     lookup: Lookup | None = None
@@ -42,7 +45,7 @@ class SurfaceFindings:
     def verdict(self) -> Verdict:
         """Verdict on the surface.
 
-        Prisms on the site's dish, errors above the noise, epochs that fit the look-up table, and the inputs' verdicts.
+        Points on the dish, errors above the noise, epochs that fit the look-up table, and the inputs' verdicts.
         """
         sources = {shape.prisms.source: shape.prisms.verdict for shape in self.shapes}
         return _own_verdict(self).resting_on(sources)
@@ -50,7 +53,7 @@ class SurfaceFindings:
 
 def reduce_surface(
     epochs: Sequence[Prisms],
-    site: SiteFolder,
+    dish: DishDesign,
     settings: ShapeSettings,
     *,
     actuators: bool = False,
@@ -61,34 +64,46 @@ def reduce_surface(
     """Surface of a dish from the prisms of its epochs, in the order measured.
 
     epochs      one: its shape; two: second less first as well; from three on: a look-up table by elevation
-    site        of the telescope
+    dish        design
     settings    of the shapes
     actuators   corrections of all actuators, from the last epoch
     positions   mm, of the actuators by name; None: their middle
     travel      of an actuator
     progress    called with (what, done, of how many)
 
-    Raises EstimationError for too few prisms and for prisms off the site's dish.
+    Raises EstimationError for too few prisms and for points off the dish.
     """
-    aperture, design = LitAperture.of(site.site.paraboloid), design_places(site)
+    aperture = dish.aperture
     shapes, placements = [], []
     for k, prisms in enumerate(epochs):
         if progress is not None:
             progress("fitting epochs", k, len(epochs))
-        placement = placement_of(prisms, aperture, design)
+        placement = placement_of(prisms, dish)
         try:
             if np.all(placement.outside > 0.0):
                 raise EstimationError(placement.doubt)
-            shapes.append(shape_of(prisms, aperture, settings))
+            lit = fitted_frame(prisms, aperture, settings) if dish.site is None else None
+            shapes.append(shape_of(prisms, aperture, settings, lit=lit))
         except EstimationError as problem:
-            raise EstimationError(f"{prisms.source}: {placement.doubt or problem}") from problem
+            few = problem.reason is ParaboloidStatus.TOO_FEW
+            text = str(problem) if few else placement.doubt or str(problem)
+            raise EstimationError(f"{prisms.source}: {text}") from problem
         placements.append(placement)
     change = change_between(epochs[0], epochs[1], aperture, settings=settings) if len(epochs) == 2 else None
     lookup = lookup_of(shapes) if len(epochs) >= 3 else None
     corrected = None
     if actuators:
-        corrected = corrections(shapes[-1], *actuators_of(site), positions=positions, travel=travel)
-    return SurfaceFindings(tuple(shapes), change, lookup, corrected, tuple(placements))
+        corrected = corrections(
+            shapes[-1], *actuators_of(dish.require_site("actuators")), positions=positions, travel=travel
+        )
+    return SurfaceFindings(
+        dish=dish,
+        shapes=tuple(shapes),
+        change=change,
+        lookup=lookup,
+        actuators=corrected,
+        placements=tuple(placements),
+    )
 
 
 def _own_verdict(result: SurfaceFindings) -> Verdict:
@@ -96,7 +111,7 @@ def _own_verdict(result: SurfaceFindings) -> Verdict:
         if placement.doubt:
             return Verdict("failed" if placement.cures else "doubtful", f"{shape.prisms.source}: {placement.doubt}")
     for shape in result.shapes:
-        if doubt := _implausible(shape):
+        if doubt := _implausible(shape, result.dish):
             return Verdict("doubtful", f"{shape.prisms.source}: {doubt}")
     if result.lookup is not None:
         return _of_lookup(result)
@@ -105,7 +120,9 @@ def _own_verdict(result: SurfaceFindings) -> Verdict:
         return Verdict("doubtful", f"{noisy[0].prisms.source}: no error of the surface stands out from the noise")
     prisms = ", ".join(str(len(shape.prisms.names)) for shape in result.shapes)
     fixed = "" if "focal-length" in result.shapes[-1].fit.free else ", focal length held"
-    return Verdict("good", f"{prisms} prisms determine the paraboloid{fixed}, and its errors stand out from the noise")
+    return Verdict(
+        "good", f"{prisms} {result.dish.noun} determine the paraboloid{fixed}, and its errors stand out from the noise"
+    )
 
 
 def _of_lookup(result: SurfaceFindings) -> Verdict:
@@ -119,24 +136,30 @@ def _of_lookup(result: SurfaceFindings) -> Verdict:
     return Verdict("good", f"a look-up table of {len(result.shapes)} epochs, which scatter about it as they claim")
 
 
-def _implausible(shape: SurfaceShape) -> str:
+def _implausible(shape: SurfaceShape, dish: DishDesign) -> str:
     """Implausible property of a fit, as a text; "" if plausible.
 
-    The surface lies within the actuators' travel t; so does a change of focal length, which moves the rim of radius R
-    by R² / 4f² of it; the dish stands where encoders say, to the largest correction of the pointing series.
+    The surface lies within the largest deviation t, of a site's dish the actuators' travel; so does a change of focal
+    length, which moves the rim of radius R by R² / 4f² of it; a site's dish stands where encoders say, to the largest
+    correction of the pointing series.
     """
     fit, aperture = shape.fit, shape.aperture
     worst = int(np.argmax(np.abs(fit.deviation)))
-    if not abs(fit.deviation[worst]) <= TRAVEL:
+    if not abs(fit.deviation[worst]) <= dish.largest:
         off = fit.deviation[worst] / MILLIMETRE
-        return f"{shape.prisms.names[worst]} is {off:+.0f} mm off the paraboloid, beyond {TRAVEL / MILLIMETRE:g} mm"
+        return (
+            f"{shape.prisms.names[worst]} is {off:+.0f} mm off the paraboloid, beyond {dish.largest / MILLIMETRE:g} mm"
+        )
     change = fit.focal_length - aperture.focal_length
-    most = TRAVEL * (2.0 * aperture.focal_length / aperture.radius) ** 2
+    most = dish.largest * (2.0 * aperture.focal_length / aperture.radius) ** 2
+    design = "the design's" if dish.site is None else "the site's"
     if abs(change) > most + SURE * fit.u_focal_length:
         return (
-            f"focal length {fit.focal_length:.3f} m, the site's is {aperture.focal_length:.3f} m (expected within "
+            f"focal length {fit.focal_length:.3f} m, {design} is {aperture.focal_length:.3f} m (expected within "
             f"{most:.2f} m): another dish?"
         )
+    if dish.site is None:
+        return ""
     u = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     limit = largest_correction()
     if np.any(np.abs(fit.rotation) > limit + SURE * u[3:]):

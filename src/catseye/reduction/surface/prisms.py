@@ -12,6 +12,8 @@ from catseye.estimation.least_squares.covariance import Dense, JointPoints
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.records.files.columns import TextColumns, columns_of
+from catseye.records.files.examples import name_of
+from catseye.records.files.point_table import read_point_table, refuse_far, require_uncertainty
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
 from catseye.records.files.verdicts import verdict_of_table
@@ -20,14 +22,11 @@ from catseye.records.network.written_pose import FILE as POSE_FILE
 from catseye.records.network.written_pose import NIGHT_POSE, read_written_pose
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.surface.dish import DishDesign
 from catseye.reduction.surface.shape import Prisms
 
 Frame = Literal["reflector", "ground"]
 AXES = "xyz"
-PLACES = ("point", "x_m", "y_m", "z_m")
-SPREADS = ("u_x_mm", "u_y_mm", "u_z_mm")
-PAIRS = {"cov_xy_mm2": (0, 1), "cov_xz_mm2": (0, 2), "cov_yz_mm2": (1, 2)}
-EXTRAS = ("kind", "shots", "from_approximate_mm", "u_mm")
 SURFACE = ("point", "x_dish_m", "y_dish_m", "z_dish_m", "deviation_mm", "u_deviation_mm")
 DISH = "dish prism"  # the kind, in coordinates.csv
 LARGEST_U_MM = 100.0
@@ -41,19 +40,21 @@ class EpochPlace(NamedTuple):
     frame           of coordinates; a reduction's are in the ground frame
     azimuth_deg, elevation_deg   posture; needed in the ground frame; a reduction has its own
     temperature_c   of the structure, if known
+    u               m, of each coordinate of a table without uncertainties
     """
 
     frame: Frame = "reflector"
     azimuth_deg: float | None = None
     elevation_deg: float | None = None
     temperature_c: float | None = None
+    u: float | None = None
 
 
-def read_prisms(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
+def read_prisms(source: Path, dish: DishDesign, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
     """Prisms of one epoch, and SHA-256 of each input file.
 
     source   directory of `catseye reduce --out`, or a CSV of docs/formats/surface.md
-    site     of the telescope
+    dish     design
     place    frame of a CSV's coordinates, and posture
 
     Raises InputError for files that cannot be used.
@@ -65,8 +66,8 @@ def read_prisms(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Pris
     if folder:
         if place.azimuth_deg is not None:
             raise InputError(f"{source}: has its own azimuth (expected azimuth_deg with tables only)")
-        return _reduced(source, site, place)
-    return _table(source, site, place)
+        return _reduced(source, dish.require_site(f"{source}: a directory"), place)
+    return _table(source, dish, place)
 
 
 def prisms_of(reduction: Reduction) -> Prisms:
@@ -127,7 +128,7 @@ def _reduced(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms,
         points=solved.places(solved.dish),
         covariance=JointPoints(Dense(block), np.arange(len(block)).reshape(-1, 3)),
         nominal=_frame(site, azimuth, elevation),
-        source=str(source),
+        source=name_of(source),
         elevation_deg=elevation,
         azimuth_deg=azimuth,
         temperature_c=place.temperature_c,
@@ -136,37 +137,27 @@ def _reduced(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms,
     return prisms, solved.hashes
 
 
-def _table(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
+def _table(source: Path, dish: DishDesign, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
     folder = Folder(source.parent)
     text = folder.text(source.name)
-    dish = "x_dish_m" in text.partition("\n")[0]
-    if dish and place.frame == "ground":
+    fitted = "x_dish_m" in text.partition("\n")[0]
+    if fitted and place.frame == "ground":
         raise refusal(source.name, "is in the dish's frame (expected frame = reflector)")
-    if dish:
+    if fitted:
         columns = columns_of(text, source.name, SURFACE, optional=("shots",))
         points = np.column_stack([columns.numbers(f"{axis}_dish_m") for axis in AXES])
         u = _spread(columns, "u_deviation_mm")
-        covariance = (u**2)[:, None, None] * np.eye(3)
+        covariance, names = (u**2)[:, None, None] * np.eye(3), _names(columns)
     else:
-        single = "u_mm" in [cell.strip() for cell in text.partition("\n")[0].split(",")]
-        needed = (*PLACES, "u_mm") if single else (*PLACES, *SPREADS)
-        columns = columns_of(text, source.name, needed, optional=(*PAIRS, *EXTRAS, *(SPREADS if single else ())))
-        if "kind" in columns.cells:
-            columns = _of_kind(columns)
-        points = np.column_stack([columns.numbers(f"{axis}_m") for axis in AXES])
-        covariance = _covariance(columns, single)
-    names = _names(columns)
-    far = np.flatnonzero(np.abs(points).max(axis=1) > FARTHEST_M)
-    if len(far):
-        raise columns.refuse(
-            int(far[0]), f"a coordinate of {np.abs(points[far[0]]).max():g} m looks like mm (expected {FARTHEST_M:g} m)"
-        )
+        table = read_point_table(text, source.name, kind=DISH, u=place.u)
+        points, covariance, names = table.x, require_uncertainty(table), table.names
+        refuse_far(table, np.zeros(3) if dish.nominal is None else dish.nominal.translation, FARTHEST_M)
     prisms = Prisms(
         names=names,
         points=points,
         covariance=covariance,
-        nominal=_nominal(source.name, site, place),
-        source=str(source),
+        nominal=_nominal(source.name, dish, place),
+        source=name_of(source),
         elevation_deg=place.elevation_deg,
         azimuth_deg=place.azimuth_deg,
         temperature_c=place.temperature_c,
@@ -179,7 +170,7 @@ def prisms_of_points(
     points: np.ndarray,
     covariance: np.ndarray,
     names: Sequence[str],
-    site: SiteFolder,
+    dish: DishDesign,
     place: EpochPlace,
     *,
     source: str = "points",
@@ -189,7 +180,7 @@ def prisms_of_points(
     points       (n, 3) m; nan where missing
     covariance   (n, 3, 3) m², or (3n, 3n) of all together
     names        n, each once
-    site, place  as for `read_prisms`
+    dish, place  as for `read_prisms`
     source       name for messages
 
     Raises InputError for shapes that do not join and values that cannot be used.
@@ -215,7 +206,7 @@ def prisms_of_points(
         names=tuple(names[int(row)] for row in rows),
         points=points[rows],
         covariance=part,
-        nominal=_nominal(source, site, place),
+        nominal=_nominal(source, dish, place),
         source=source,
         elevation_deg=place.elevation_deg,
         azimuth_deg=place.azimuth_deg,
@@ -228,22 +219,15 @@ def independent(u: np.ndarray) -> np.ndarray:
     return np.asarray(u[:, :, None] * np.eye(3) * u[:, None, :])
 
 
-def _nominal(source: str, site: SiteFolder, place: EpochPlace) -> Transform:
+def _nominal(source: str, dish: DishDesign, place: EpochPlace) -> Transform:
     """Outer frame from the nominal paraboloid's."""
+    if dish.nominal is not None:
+        return dish.nominal
     if place.frame == "reflector":
         return Transform("reflector", "reflector", np.eye(3), np.zeros(3))
     if place.azimuth_deg is None or place.elevation_deg is None:
         raise refusal(source, "is in the ground frame: give the telescope's azimuth_deg and elevation_deg")
-    return _frame(site, place.azimuth_deg, place.elevation_deg)
-
-
-def _of_kind(columns: TextColumns) -> TextColumns:
-    """Rows of a reduction's coordinates that are dish prisms."""
-    rows = [k for k, kind in enumerate(columns.cells["kind"]) if kind == DISH]
-    if not rows:
-        raise refusal(columns.file, f"has no row of kind {DISH!r} (expected prisms of the dish)")
-    cells = {name: [values[k] for k in rows] for name, values in columns.cells.items()}
-    return TextColumns(columns.file, cells, [columns.lines[k] for k in rows])
+    return _frame(dish.require_site(source), place.azimuth_deg, place.elevation_deg)
 
 
 def _names(columns: TextColumns) -> tuple[str, ...]:
@@ -260,16 +244,3 @@ def _spread(columns: TextColumns, name: str) -> np.ndarray:
     values = columns.numbers(name)
     columns.check(name, (values > 0.0) & (values <= LARGEST_U_MM), f"above 0 to {LARGEST_U_MM:g} mm")
     return values * MILLIMETRE
-
-
-def _covariance(columns: TextColumns, single: bool) -> np.ndarray:
-    """Covariance of each point, (k, 3, 3) m^2."""
-    spreads: Sequence[str] = ("u_mm",) * 3 if single else SPREADS
-    u = np.column_stack([_spread(columns, name) for name in spreads])
-    covariance = independent(u)
-    for name, (i, j) in PAIRS.items():
-        if name in columns.cells:
-            covariance[:, i, j] = covariance[:, j, i] = columns.numbers(name) * MILLIMETRE**2
-    least = np.linalg.eigvalsh(covariance)[:, 0]
-    columns.check("point", least > 0.0, "covariances smaller than the product of both u")
-    return covariance

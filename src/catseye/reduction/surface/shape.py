@@ -10,8 +10,9 @@ import numpy as np
 from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.errors import EstimationError, ValidityError
 from catseye.estimation.least_squares.covariance import JointPoints
-from catseye.estimation.shapes.paraboloid import ParaboloidFit, covariance_along, fit_paraboloid
+from catseye.estimation.shapes.paraboloid import ParaboloidFit, covariance_along, fit_paraboloid, place_paraboloid
 from catseye.geometry.frames.frame import Transform
+from catseye.geometry.frames.rotation import from_vector
 from catseye.optics.aperture import cells, coherent_gain, ruze_gain
 from catseye.optics.zernike import Numbering, Term, orthonormal, terms, zernike
 from catseye.records.site.site import ParaboloidRecord
@@ -238,7 +239,22 @@ class SurfaceShape:
         )
 
 
-def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | None = None) -> SurfaceShape:
+def fitted_frame(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings) -> Transform:
+    """Outer frame from the best paraboloid's, all points of equal weight.
+
+    Raises EstimationError as `shape_of`.
+    """
+    placed = place_paraboloid(
+        prisms.points, prisms.nominal, focal_length=aperture.focal_length, free=settings.free, measure="half-path"
+    )
+    rotation = from_vector(placed.rotation) @ prisms.nominal.rotation
+    nominal = prisms.nominal
+    return Transform(nominal.to, nominal.from_, rotation, nominal.translation + placed.translation)
+
+
+def shape_of(
+    prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | None = None, *, lit: Transform | None = None
+) -> SurfaceShape:
     """Surface of one epoch.
 
     The sum of squared half-path errors under the illumination is least.
@@ -246,12 +262,13 @@ def shape_of(prisms: Prisms, aperture: LitAperture, settings: ShapeSettings | No
     prisms     their places and covariance
     aperture   of the design
     settings   free parameters, illumination, results
+    lit        outer frame from the illuminated dish's; the nominal one without
 
     The weight of each prism is the illumination nearest to it. Raises EstimationError for too few prisms and for
     prisms that do not determine the paraboloid or the terms; ValidityError for settings out of range.
     """
     settings = settings or ShapeSettings()
-    first = aperture.unit(prisms.nominal.inverse().points(prisms.points))
+    first = aperture.unit((lit or prisms.nominal).inverse().points(prisms.points))
     weights = cells(first, edge_db=settings.taper_db)
     fit = fit_paraboloid(
         prisms.points,

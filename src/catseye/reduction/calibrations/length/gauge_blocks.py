@@ -40,7 +40,12 @@ Coefficient = Annotated[float, Within(-5, 50)]
 
 
 class Block(Record):
-    """Gauge block: name in the table, certified length at 20 °C, u."""
+    """Gauge block: name in the table, certified length at 20 °C, u.
+
+    name        as in the table
+    length_mm   certified length at 20 °C
+    u_mm        standard uncertainty of the length
+    """
 
     name: Words
     length_mm: Annotated[float, LENGTH]
@@ -50,9 +55,10 @@ class Block(Record):
 class LengthSheet(Sheet):
     """Common keys of both kinds' sheets.
 
-    expansion_ppm_per_c, u_...   of blocks or spacers: 11.5 for steel
-    temperature_c, u_temperature_c   of them, the thermometer's offset common; a column where it changed
-    u_reading_mm                 scatter of a reading, if known
+    expansion_ppm_per_c, u_expansion_ppm_per_c  of blocks or spacers: 11.5 for steel
+    temperature_c     of blocks or spacers; a column where it changed
+    u_temperature_c   of the thermometer's offset, common to all readings
+    u_reading_mm      scatter of a reading, if known
     """
 
     expansion_ppm_per_c: Coefficient
@@ -65,9 +71,9 @@ class LengthSheet(Sheet):
 class BlocksSheet(LengthSheet):
     """Sheet of an instrument's calibration against gauge blocks.
 
-    block            certificates, one table a block
+    block                certificates, one table a block
     film_um, u_film_um   thickness of each film where two blocks are wrung together
-    estimate_scale   estimate the instrument's scale beside its zero
+    estimate_scale       estimate the instrument's scale beside its zero
     """
 
     block: Annotated[tuple[Block, ...], Field(strict=False, min_length=1)]

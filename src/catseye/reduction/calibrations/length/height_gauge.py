@@ -54,16 +54,18 @@ SHARED = 13  # parameters before those of the set-ups
 class HeightSheet(Sheet):
     """Sheet of offsets by a height gauge.
 
-    ball_diameter_mm, mirror_diameter_mm   of what is touched: the tooling ball, a journal or plug gauge on the mirror's
-                          axes; with u_...; needed where tops or bottoms are touched
-    block, film_um, u_film_um   gauge blocks under the indicator, as for gauge-blocks
-    u_lean_arcsec         of what it stands on, towards the front and the right: the same in all set-ups with one axis
-                          up or down
-    u_seating_arcsec      independent lean of each set-up, both directions
-    u_scale_ppm           of the height gauge
-    gauge_temperature_c, gauge_expansion_ppm_per_c   of the gauge's scale and the blocks, which are true at 20 degrees
-    dx_mm, dy_mm, dz_mm, u_offset_mm   of an offset whose axis never looks up; it is fixed then
-    u_reading_mm          scatter of a reading, if known
+    ball_diameter_mm, u_ball_diameter_mm  of the tooling ball; needed where tops or bottoms are touched
+    mirror_diameter_mm, u_mirror_diameter_mm  of a journal or plug gauge on the mirror's axes, likewise
+    block                                 gauge blocks under the indicator, as for gauge-blocks
+    film_um, u_film_um                    thickness of each film between blocks
+    u_lean_arcsec                         of what it stands on, towards the front and the right: the same in all
+                                          set-ups with one axis up or down
+    u_seating_arcsec                      independent lean of each set-up, both directions
+    u_scale_ppm                           of the height gauge
+    gauge_temperature_c                   temperature of the gauge's scale and the blocks, which are true at 20 °C
+    gauge_expansion_ppm_per_c             their coefficient of expansion
+    dx_mm, dy_mm, dz_mm, u_offset_mm      of an offset whose axis never looks up; it is fixed then
+    u_reading_mm                          scatter of a reading, if known
     """
 
     ball_diameter_mm: Diameter | None = None

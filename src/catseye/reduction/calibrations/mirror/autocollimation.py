@@ -49,18 +49,24 @@ STEP = 1e-5  # rad
 class AutocollimationSheet(Sheet):
     """Sheet of an autocollimation.
 
-    displays             "beam" or "mirror": which angle the autocollimator's scale shows, the beam's or half of it
-    x_sign, y_sign       1 if the reading grows as the mirror's normal leans towards +x^, +y^ (up); -1 if it falls
-    na0_nominal, ne0_nominal   counts, start of the search
-    u_na0_counts         of na0_nominal, without a reading into a flat: then N_a0 is fixed
-    u_face_tilt_arcsec   of a face tilt of zero, where the readings do not determine it: then it is fixed
-    face_tilt_limit_arcsec   tolerance of the mirror's adjustment, if the tilt is to be judged
-    u_axis_tilt_arcsec   elevation shaft against the plane across the azimuth axis
-    u_lean_x_arcsec, u_lean_y_arcsec, u_roll_arcsec   of the autocollimator against the mount's z, and about it
-    u_scale_percent      of its scale
-    u_flat_arcsec        lean of the flat out of the vertical (towards y); u_flat_turn_arcsec, its turn about y
-    u_reading_arcsec     scatter of each reading of each axis, as displayed, if known
-    u_count              counts: of the shafts' places by the encoder's counts, independent for each reading
+    displays                           "beam" or "mirror": angle on the autocollimator's scale, the beam's or half
+                                       of it
+    x_sign, y_sign                     1 if the reading grows as the mirror's normal leans towards +x^, +y^ (up); -1
+                                       if it falls
+    na0_nominal, ne0_nominal           counts, start of the search
+    u_na0_counts                       of na0_nominal, without a reading into a flat: then N_a0 is fixed
+    u_face_tilt_arcsec                 of a face tilt of zero, where the readings do not determine it: then it is
+                                       fixed
+    face_tilt_limit_arcsec             tolerance of the mirror's adjustment, if the tilt is to be judged
+    u_axis_tilt_arcsec                 elevation shaft against the plane across the azimuth axis
+    u_lean_x_arcsec, u_lean_y_arcsec   of the autocollimator against the mount's z
+    u_roll_arcsec                      of the autocollimator about the mount's z
+    u_scale_percent                    of its scale
+    u_flat_arcsec                      lean of the flat out of the vertical (towards y)
+    u_flat_turn_arcsec                 turn of the flat about y
+    u_reading_arcsec                   scatter of each reading of each axis, as displayed, if known
+    u_count                            counts: of the shafts' places by the encoder's counts, independent for each
+                                       reading
     """
 
     displays: Literal["beam", "mirror"]

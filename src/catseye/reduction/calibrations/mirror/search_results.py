@@ -66,10 +66,10 @@ NAMED_PART = 0.3  # of a unit combination: parameters named in it
 class SearchSheet(Sheet):
     """Sheet of a campaign's search results.
 
-    u_counts         of each count: the resolution of the search; the columns u_azimuth_counts and u_elevation_counts
-                     say it for each target instead
-    u_target_mm      of each coordinate of each target; a target seen more than once keeps its error
-    [monument], [mirror]   the station's records as tables, with the u_... keys of angles and zeros
+    u_counts           of each count: the resolution of the search; the columns u_azimuth_counts and
+                       u_elevation_counts state it for each target instead
+    u_target_mm        of each coordinate of each target; a target seen more than once keeps its error
+    monument, mirror   the station's records as tables, with the u_... keys of angles and zeros
     """
 
     u_counts: Annotated[float, UNCERTAIN] | None = None

@@ -17,6 +17,10 @@ ULength = Annotated[float, Within(0, 1e4)]  # mm
 class Reference(Record):
     """Target with a known direction from the v-block.
 
+    name               of the target
+    v_block_deg        direction of the v-block, clockwise from the target
+    u_v_block_arcsec   of that direction
+
     The v-block lies v_block_deg clockwise of it.
     """
 
@@ -26,7 +30,11 @@ class Reference(Record):
 
 
 class KnownPoint(Record):
-    """Target with coordinates in the ground frame and their u."""
+    """Target with coordinates in the ground frame and their u.
+
+    name               of the target
+    x_mm, y_mm, z_mm   coordinates
+    """
 
     name: Name
     x_mm: Coordinate
@@ -39,6 +47,14 @@ class KnownPoint(Record):
 
 class CataloguedStar(Record):
     """Star, ICRS at J2000.0.
+
+    name                   of the star
+    ra_deg                 right ascension
+    dec_deg                declination
+    motion_ra_mas          motion in right ascension times cos(declination), a year
+    motion_dec_mas         motion in declination, a year
+    parallax_mas           annual parallax
+    radial_velocity_km_s   positive away from us
 
     Motion a year, that of right ascension times cos(declination).
     """
@@ -58,7 +74,8 @@ class AzimuthSheet(MonumentSheet):
     u_x_mm, u_y_mm, u_z_mm          of the fixed point
     covariance_mm2                  of fixed point and points, x y z each in the order of the sheet, instead of all u
     alpha2_rad, alpha3_rad          of the mount, if known: they carry the instrument's offset
-    instrument_dx_mm, _dy_, _dz_    from the fixed point to where the instrument's axes meet, mount axes
+    instrument_dx_mm, instrument_dy_mm, instrument_dz_mm  from the fixed point to where the instrument's axes meet,
+                                    mount axes
     u_instrument_mm                 of each
     plate_zero_deg, u_plate_zero_arcsec   what the circle reads towards the v-block, if that was calibrated
     u_transport_arcsec              change of the circle against the mount between the lab before and after

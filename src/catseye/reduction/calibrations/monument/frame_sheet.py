@@ -18,12 +18,14 @@ Longitude = Annotated[float, Within(-180, 180)]
 class FrameSheet(Sheet):
     """Sheet of a calibration in the ground frame.
 
-    origin_latitude_deg, origin_longitude_deg   NAD83, east positive; the pintle bearing
-    origin_elevation_m                          NAVD88, of z = 0 below or above the pintle
-    geoid_height_m                              of the geoid above the ellipsoid there
-    xi_arcsec, eta_arcsec                       deflection of the vertical: a level's zenith lies xi north and eta east
-                                                of the ellipsoid's normal; u_deflection_arcsec of each
-    z_is_plumb                                  the frame's z is the plumb line at the origin, not the normal
+    origin_latitude_deg     of the pintle bearing, NAD83
+    origin_longitude_deg    of the pintle bearing, NAD83, east positive
+    origin_elevation_m      NAVD88, of z = 0 below or above the pintle
+    geoid_height_m          of the geoid above the ellipsoid there
+    xi_arcsec, eta_arcsec   deflection of the vertical: a level's zenith lies xi north and eta east of the
+                            ellipsoid's normal
+    u_deflection_arcsec     of each of these two
+    z_is_plumb              the frame's z is the plumb line at the origin, not the normal
     """
 
     origin_latitude_deg: Latitude = PINTLE_LATITUDE / DEGREE

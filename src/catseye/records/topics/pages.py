@@ -1,0 +1,125 @@
+"""Pages of the documentation by name: find, list and read them."""
+
+import posixpath
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+
+from catseye.errors import InputError
+from catseye.records.files.refusal import shown
+from catseye.records.topics.markup import linked_pages, page_title, plain_markdown
+
+NEAR = 3  # names that a refusal proposes
+LIKENESS = 0.6  # of a proposed name, as difflib measures it
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A page of the documentation.
+
+    name     path in the documentation without .md: "conventions", "formats/beam"; a folder's index has its name
+    source   the page as it is written, in MyST
+    """
+
+    name: str
+    source: str
+
+    @property
+    def title(self) -> str:
+        """First heading of the page."""
+        return page_title(self.source) or self.name
+
+    @cached_property
+    def text(self) -> str:
+        """Page as plain Markdown, for a terminal."""
+        return plain_markdown(self.source)
+
+    @property
+    def related(self) -> tuple[str, ...]:
+        """Names of the topics that the page links to, and of the pages under it."""
+        names = topic_names()
+        inside = "" if self.name == "index" else self.name
+        folder = inside if f"{self.name}/index" in _files() else posixpath.dirname(self.name)
+        linked = [topic_name(posixpath.normpath(posixpath.join(folder, page))) for page in linked_pages(self.source)]
+        under = [name for name in names if posixpath.dirname(name) == inside]
+        return tuple(name for name in dict.fromkeys([*linked, *under]) if name in names and name != self.name)
+
+    def to_object(self) -> dict[str, object]:
+        """Topic as an object for JSON."""
+        return {"topic": self.name, "title": self.title, "text": self.text, "related": list(self.related)}
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_markdown_(self) -> str:
+        return self.text
+
+
+def documentation_directory() -> Path:
+    """Directory of the pages, in the package or beside the sources; InputError if missing."""
+    package = Path(__file__).parents[2]
+    for root in (package, package.parents[1]):
+        if (root / "docs" / "index.md").is_file() and (root / "docs" / "formats").is_dir():
+            return root / "docs"
+    raise InputError(f"the documentation is missing: neither {package / 'docs'} nor {package.parents[1] / 'docs'}")
+
+
+def _files() -> dict[str, Path]:
+    """Pages by their path without .md; folders that begin with _ or . hold no pages."""
+    root = documentation_directory()
+    paths = {path.relative_to(root): path for path in root.rglob("*.md")}
+    return {
+        place.with_suffix("").as_posix(): path
+        for place, path in paths.items()
+        if not any(part.startswith(("_", ".")) for part in place.parts)
+    }
+
+
+def topic_name(page: str) -> str:
+    """Name of the topic of a page.
+
+    page   path in the documentation, with or without .md
+
+    >>> topic_name("formats/index.md"), topic_name("formats/beam"), topic_name("index")
+    ('formats', 'formats/beam', 'index')
+    """
+    return page.removesuffix(".md").removesuffix("/index")
+
+
+def topic_names() -> tuple[str, ...]:
+    """Names of all topics, sorted; pages of the front before folders."""
+    return tuple(sorted(map(topic_name, _files()), key=lambda name: ("/" in name, name)))
+
+
+def topic_titles() -> dict[str, str]:
+    """Titles of all topics by name."""
+    files = {topic_name(page): path for page, path in _files().items()}
+    return {name: Topic(name, files[name].read_text(encoding="utf-8")).title for name in topic_names()}
+
+
+def read_topic(name: str) -> Topic:
+    """Topic of a name; InputError with near matches for an unknown one.
+
+    name   "conventions", "formats/beam", or the last part alone where only one topic ends so
+    """
+    files = {topic_name(page): path for page, path in _files().items()}
+    wanted = topic_name(name.strip("/").removeprefix("docs/").lower())
+    full = [wanted] if wanted in files else [each for each in files if each.rpartition("/")[2] == wanted]
+    if len(full) == 1:
+        return Topic(full[0], files[full[0]].read_text(encoding="utf-8"))
+    if full:
+        raise InputError(f"topic {shown(name)} is not unique (expected {' or '.join(sorted(full))})")
+    near = _near(wanted, sorted(files))
+    advice = f"did you mean {' or '.join(near)}? " if near else ""
+    raise InputError(f"topic {shown(name)} not found ({advice}catseye help lists all topics)")
+
+
+def _near(name: str, names: list[str]) -> list[str]:
+    """Topics whose names, or whose last parts, are like a name; or hold it."""
+    ends: dict[str, list[str]] = {}
+    for each in names:
+        ends.setdefault(each.rpartition("/")[2], []).append(each)
+    words = get_close_matches(name.rpartition("/")[2], list(ends), NEAR, LIKENESS)
+    near = [*get_close_matches(name, names, NEAR, LIKENESS), *(each for word in words for each in ends[word])]
+    return list(dict.fromkeys([*near, *(each for each in names if len(name) > 2 and name in each)]))[:NEAR]
