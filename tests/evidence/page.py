@@ -27,10 +27,10 @@ def table(head, rows):
 def run_text(data):
     """Sentence about the run."""
     run = data["run"]
-    minutes = run["processor_s"] / 60
     return (
         f"Run of {run['date']} by catseye {run['version']} ({run['revision']}) on {run['processor']}, "
-        f"{run['cores']} cores, Python {run['python']}, numpy {run['numpy']}: {minutes:.1f} minutes of processor time."
+        f"{run['cores']} cores, Python {run['python']}, numpy {run['numpy']}: {run['processor_s'] / 60:.1f} minutes of "
+        "processor time."
     )
 
 
