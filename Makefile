@@ -7,7 +7,7 @@ STAMP := .venv/.catseye-installed
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(1 + (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()))')
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: help setup check style types test tests test-all test-web front front-check docs demo bench bench-guard release lower-bounds clean
+.PHONY: help setup check style types test tests test-all test-web front front-check docs demo evidence bench bench-guard release lower-bounds clean
 
 help:  ## list the verbs
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -66,6 +66,9 @@ docs: setup  ## the documentation in docs/_build/html: strict, every command exe
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
+
+evidence: setup  ## scatter against claims, wrong records, peers' answers: writes docs/evidence/how-good.md
+	PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/evidence/run.py
 
 bench: setup  ## all benchmarks beside others and the machine's limit, in one table: writes docs/benchmarks.md
 	$(BIN)/python benchmarks/run.py --write

@@ -18,6 +18,8 @@ extensions = [
     "command_line",
     "commands",
     "docstrings",
+    "drawings",
+    "gallery",
     "myst_nb",
     "python_reference",
     "references",

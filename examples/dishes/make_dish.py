@@ -55,7 +55,7 @@ def receiver(rng):
     """Targets of the receiver by name, (3,) m: first and later."""
     first, later = {}, {}
     for number in range(12):
-        angle, height = 2.0 * np.pi * number / 6.0, 8.4 if number < 6 else 9.6
+        angle, height = np.pi * (number / 3.0 + (number >= 6) / 6.0), 8.4 if number < 6 else 9.6
         first[f"R{number + 1:02d}"] = np.array([0.9 * np.cos(angle), 0.9 * np.sin(angle), height])
     for name, place in first.items():
         moved = PIVOT + MOVE + turned(TURN, (place - PIVOT)[None])[0]

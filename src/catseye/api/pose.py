@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from catseye.reduction.pose.findings import PoseFindings
 
 OPTICS = ("prime", "gregorian")
+LEAST_U_MM, MOST_U_MM = 1e-6, 100.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,7 +39,7 @@ class PoseResult(Result):
 
     second = pivot + translation + rotation (first - pivot)
 
-    frame         axes of the answer: "ground", "alidade" or "reflector"
+    frame         axes of the answer: "ground", "alidade" or "reflector"; "table" of tables without a site
     pivot         (3,) m, in that frame
     translation   (3,) m, of the pivot
     rotation      (3,) rad, rotation vector, right-handed
@@ -148,7 +149,7 @@ def pose(
     epoch: "str | os.PathLike[str] | SolvedPoints | NightResult",
     earlier: "str | os.PathLike[str] | SolvedPoints | NightResult | None" = None,
     *,
-    site: "str | os.PathLike[str] | SiteFolder",
+    site: "str | os.PathLike[str] | SiteFolder | None" = None,
     group: str | None = None,
     points: Sequence[str] | None = None,
     frame: str | None = None,
@@ -158,14 +159,16 @@ def pose(
     tilt_arcsec: Annotated[Any, In("arcsec", many=True)] = None,
     posture_deg: Annotated[Any, In("deg", many=True)] = None,
     earlier_posture_deg: Annotated[Any, In("deg", many=True)] = None,
+    u_mm: Annotated[Any, In("mm", one=True)] = None,
 ) -> PoseResult:
-    """Pose of a part of the antenna, and its beam.
+    """Pose of a part of the antenna, and its beam; or of any points of two tables.
 
     Six degrees of freedom between two epochs or against design; beam and focus on request.
 
-    epoch         what `reduce` gave or wrote, or its coordinates.json
-    earlier       the epoch to count from; the site's design without
-    site          site or campaign whose records say what stands where
+    epoch         what `reduce` gave or wrote, its coordinates.json, or a table of points (docs/formats/surface.md)
+    earlier       the epoch to count from; the site's design without; a table without u is exact
+    site          site or campaign whose records say what stands where; without, points of the same names are one body,
+                  in the axes of both tables
     group         "dish" (usual), "feed-arm", "alidade" or "subreflector", or
     points        names of points that move as one
     frame         "ground" (usual), "alidade" or "reflector"
@@ -173,18 +176,28 @@ def pose(
     robust        how points that moved alone are left out, "l1", "huber", "igg3" or "biweight"
     pointing      "prime" or "gregorian": optics whose beam and focus are derived, of the dish in the reflector frame
     tilt_arcsec   x, y and their u of an inclinometer on the alidade, its zero taken out
+    u_mm          of each coordinate of EPOCH, a table without columns of u
     posture_deg, earlier_posture_deg   azimuth and elevation of the epochs, where their files do not say
 
     Raises ArgumentError for arguments that do not fit together, InputError where points, postures or files are missing
     and EstimationError where nothing can be fitted.
     """
     from catseye.records.site.folder import SiteFolder, read_site
-    from catseye.reduction.pose.findings import PoseSettings, find_pose
+    from catseye.reduction.pose.findings import PoseFindings, PoseSettings, find_pose
+    from catseye.reduction.pose.points import pose_of_points
 
     _refuse_mixtures(group, points, frame, pointing, tilt_arcsec)
+    if u_mm is not None and not LEAST_U_MM <= u_mm <= MOST_U_MM:
+        raise ArgumentError(f"u_mm = {u_mm:g} (expected {LEAST_U_MM:g} to {MOST_U_MM:g} mm)", "u_mm")
+    if site is None:
+        _refuse_without_site(
+            earlier=earlier is None, group=group, frame=frame, pointing=pointing, tilt_arcsec=tilt_arcsec,
+            posture_deg=posture_deg, earlier_posture_deg=earlier_posture_deg,
+        )  # fmt: skip
     postures = _posture("posture_deg", posture_deg), _posture("earlier_posture_deg", earlier_posture_deg)
-    records = site if isinstance(site, SiteFolder) else read_site(place_of(site))
-    later, before = _solved(epoch, postures[0]), None if earlier is None else _solved(earlier, postures[1])
+    records = site if isinstance(site, SiteFolder) or site is None else read_site(place_of(site))
+    later = _solved(epoch, postures[0], None if u_mm is None else u_mm * MILLIMETRE)
+    before = None if earlier is None else _solved(earlier, postures[1])
     settings = PoseSettings(
         group=None if points is not None else group or "dish",
         points=None if points is None else tuple(points),
@@ -194,7 +207,12 @@ def pose(
     )
     tilt = None if tilt_arcsec is None else tuple(v * ARCSECOND for v in tilt_arcsec)
     with free_threads():
-        found = find_pose(later, before, records, settings=settings, optics=pointing, tilt=tilt)
+        if records is None:
+            assert before is not None
+            group_pose = pose_of_points(later, before, points=settings.points, pivot=settings.pivot, robust=robust)
+            found = PoseFindings(group_pose)
+        else:
+            found = find_pose(later, before, records, settings=settings, optics=pointing, tilt=tilt)
     fit = found.pose.pose
     read = [place_of(each, output=True) for each in (epoch, earlier) if isinstance(each, str | os.PathLike)]
     read += [place_of(site)] if isinstance(site, str | os.PathLike) else []
@@ -213,15 +231,20 @@ def pose(
         beam_covariance=None if found.beam is None else found.beam.covariance,
         found=found,
         settings={
-            "group": settings.group,
+            "group": None if records is None else settings.group,
             "points": None if points is None else list(points),
-            "frame": settings.frame,
+            "frame": fit.frame,
             "pivot": pivot,
             "robust": robust,
             "pointing": pointing,
             "tilt": tilt_arcsec,
+            "u_mm": u_mm,
         },
-        hashes={**later.hashes, **({} if before is None else before.hashes), **records.hashes},
+        hashes={
+            **later.hashes,
+            **({} if before is None else before.hashes),
+            **({} if records is None else records.hashes),
+        },
         read=tuple(read),
     )
 
@@ -249,6 +272,19 @@ def _refuse_mixtures(
             raise ArgumentError("pointing needs the dish in the frame reflector", "pointing")
 
 
+def _refuse_without_site(*, earlier: bool, **given: Any) -> None:
+    """Raise ArgumentError for arguments that need a site's records.
+
+    earlier   True where no earlier epoch is given
+    given     the others; None where they are not given
+    """
+    if earlier:
+        raise ArgumentError("earlier or site is needed: the epoch to count from, or the design", "earlier", "site")
+    for name, value in given.items():
+        if value is not None:
+            raise ArgumentError(f"{name} needs site: the records of a telescope", name, "site")
+
+
 def _posture(name: str, posture_deg: Sequence[float] | None) -> tuple[float, float] | None:
     """Posture (2,), rad. Raises ArgumentError beyond the telescope's."""
     if posture_deg is None:
@@ -260,14 +296,16 @@ def _posture(name: str, posture_deg: Sequence[float] | None) -> tuple[float, flo
 
 
 def _solved(
-    epoch: "str | os.PathLike[str] | SolvedPoints | NightResult", posture: tuple[float, float] | None
+    epoch: "str | os.PathLike[str] | SolvedPoints | NightResult",
+    posture: tuple[float, float] | None,
+    u: float | None = None,
 ) -> "SolvedPoints":
-    """Points of an epoch, with the posture given for it."""
-    from catseye.records.network.solved_points import SolvedPoints, read_solved_points
+    """Points of an epoch, with the posture given for it, and u (m) where a table has none."""
+    from catseye.records.network.solved_points import SolvedPoints, read_points
     from catseye.reduction.pose.dish_ways import solved_points
 
     if isinstance(epoch, NightResult):
         solved = replace(solved_points(epoch.reduction), verdict=epoch.verdict)
     else:
-        solved = epoch if isinstance(epoch, SolvedPoints) else read_solved_points(place_of(epoch, output=True))
+        solved = epoch if isinstance(epoch, SolvedPoints) else read_points(place_of(epoch, output=True), u=u)
     return solved if posture is None else replace(solved, posture=posture)

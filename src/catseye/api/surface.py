@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from catseye.optics.zernike import Numbering
     from catseye.records.site.folder import SiteFolder
     from catseye.reduction.surface.actuators import Travel
-    from catseye.reduction.surface.dish import Dish
+    from catseye.reduction.surface.dish import DishDesign
     from catseye.reduction.surface.findings import SurfaceFindings
     from catseye.reduction.surface.prisms import EpochPlace, Frame
     from catseye.reduction.surface.shape import Prisms
@@ -293,7 +293,7 @@ def _dish(
     centre: Sequence[float],
     vertex: Sequence[float],
     axis: Sequence[float],
-) -> "Dish":
+) -> "DishDesign":
     """Design: of a site's records, or of a focal length with a size.
 
     given   focal_length_m, radius_m and diameter_m; None where they are not given
@@ -301,7 +301,7 @@ def _dish(
     Raises ArgumentError for arguments that do not fit together.
     """
     from catseye.records.site.folder import SiteFolder, read_site
-    from catseye.reduction.surface.dish import Dish
+    from catseye.reduction.surface.dish import DishDesign
 
     focal_length, radius, diameter = given["focal_length_m"], given["radius_m"], given["diameter_m"]
     rows = {"centre": (centre, 2), "vertex": (vertex, 3), "axis": (axis, 3)}
@@ -313,7 +313,7 @@ def _dish(
         for name, is_given in moved.items():
             if is_given:
                 raise ArgumentError(f"{name} needs focal_length_m, too: a dish without a site", name, "focal_length_m")
-        return Dish.of_site(site if isinstance(site, SiteFolder) else read_site(place_of(site or "gbt")))
+        return DishDesign.of_site(site if isinstance(site, SiteFolder) else read_site(place_of(site or "gbt")))
     if site is not None:
         raise ArgumentError("give site or focal_length_m, one of the two", "site", "focal_length_m")
     if (radius is None) == (diameter is None):
@@ -323,7 +323,7 @@ def _dish(
     for name, (_, count) in rows.items():
         if numbers[name].shape != (count,) or not np.isfinite(numbers[name]).all():
             raise InputError(f"{name} = {numbers[name].tolist()} (expected {count} numbers)")
-    return Dish.of_paraboloid(
+    return DishDesign.of_paraboloid(
         focal_length, diameter / 2.0 if radius is None else radius, **numbers,
         size="diameter_m" if radius is None else "radius_m",
     )  # fmt: skip
@@ -372,7 +372,7 @@ def require_actuators_file(path: Path | None, *sources: "str | os.PathLike[str]"
 class _Placed:
     """Dish and frame of tables and points, and postures and temperatures of the epochs."""
 
-    dish: "Dish"
+    dish: "DishDesign"
     frame: "Frame"
     azimuth_deg: float | None
     elevation_deg: Sequence[float]

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from catseye.gateways.writers.samplers_fits import read_samplers
-from dish_scene import FOLDER
+from reduction.surface.any_dish_scene import FOLDER
 
 DISH = ("--focal-length-m", 9, "--diameter-m", 25)
 HEAD = "point,x_mm,y_mm,z_mm,u_x_mm,u_y_mm,u_z_mm"

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 import catseye
 from catseye.errors import ArgumentError, InputError
-from dish_scene import FOLDER, NoNoise, maker
 from draws import draws, same_sigmas
+from reduction.surface.any_dish_scene import FOLDER, NoNoise, maker
 from surface_scene import SITE, prisms
 
 DISH = {"focal_length_m": 9.0, "diameter_m": 25.0}

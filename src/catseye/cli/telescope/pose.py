@@ -16,19 +16,23 @@ POSTURE = row_of(2, "AZ,EL in degrees")
 
 @app.command(
     epilog="\b\nExample: catseye pose night-01-report --site examples/night-01 --group dish --frame reflector\n"
-    "         catseye pose late-report early-report --site examples/night-01 --pointing prime --out pose-report"
+    "         catseye pose late-report early-report --site examples/night-01 --pointing prime --out pose-report\n"
+    "         catseye pose later.csv earlier.csv --pivot 0,0,9"
 )
 def pose(  # noqa: PLR0913 - its options are its command line
     epoch: Annotated[
-        Path, typer.Argument(metavar="EPOCH", help="Output of catseye reduce --out, or its coordinates.json.")
+        Path, typer.Argument(metavar="EPOCH", help="Output of catseye reduce --out, or a table of points.")
     ],
     earlier: Annotated[
         Path | None, typer.Argument(metavar="[EARLIER]", help="The epoch to count from; the site's design without.")
     ] = None,
     *,
     site: Annotated[
-        Path, typer.Option("--site", metavar="DIR", help="Site or campaign whose records say what stands where.")
-    ],
+        Path | None,
+        typer.Option(
+            "--site", metavar="DIR", help="Site or campaign whose records say what stands where; not for two tables."
+        ),
+    ] = None,
     group: Annotated[
         str | None,
         typer.Option(
@@ -93,6 +97,10 @@ def pose(  # noqa: PLR0913 - its options are its command line
             "--earlier-posture", metavar="AZ,EL", callback=POSTURE, help="Posture of EARLIER; its pose.json's without."
         ),
     ] = None,
+    u_mm: Annotated[
+        float | None,
+        typer.Option("--u-mm", min=1e-6, max=100.0, help="u of each coordinate of EPOCH, a table without u, mm."),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
@@ -123,6 +131,7 @@ def pose(  # noqa: PLR0913 - its options are its command line
             tilt_arcsec=tilt_arcsec,
             posture_deg=posture_deg,
             earlier_posture_deg=earlier_posture_deg,
+            u_mm=u_mm,
         )
         if out is not None:
             save(result, out)

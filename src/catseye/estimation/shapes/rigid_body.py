@@ -364,14 +364,22 @@ def _stepped(kind: str, matrix: np.ndarray, step: np.ndarray) -> np.ndarray:
     return turned * (1.0 + step[3] / np.cbrt(np.linalg.det(matrix))) if kind == "similarity" else turned
 
 
+def weak_axis(covariance: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Axis (3,) of an undetermined rotation and its u, rad; None for none.
+
+    covariance   (6, 6) or more, translation then rotation
+    """
+    values, vectors = np.linalg.eigh(covariance[3:6, 3:6])
+    return (vectors[:, -1], float(values[-1] ** 0.5)) if values[-1] > WEAK_TURN**2 else None
+
+
 def _status(kind: str, covariance: np.ndarray, mirrored: bool) -> str:
     if mirrored:
         return MIRRORED
     if kind != "affine":
-        values, vectors = np.linalg.eigh(covariance[3:6, 3:6])
-        if values[-1] > WEAK_TURN**2:
-            axis = ", ".join(f"{v:.3f}" for v in vectors[:, -1])
-            return WEAK.format(axis=axis, u=values[-1] ** 0.5)
+        weak = weak_axis(covariance)
+        if weak is not None:
+            return WEAK.format(axis=", ".join(f"{v:.3f}" for v in weak[0]), u=weak[1])
     return CONVERGED
 
 

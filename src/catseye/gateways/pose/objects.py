@@ -6,6 +6,7 @@ import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.estimation.shapes.pose import COMPONENTS
+from catseye.estimation.shapes.rigid_body import weak_axis
 from catseye.records.network.written_pose import GROUP_POSE
 from catseye.reduction.pose.findings import PoseFindings
 from catseye.reduction.pose.pointing_offsets import COMPONENTS as BEAM
@@ -45,8 +46,18 @@ def pose_result_object(result: PoseFindings) -> dict[str, Any]:
         },
         "left_out": pose.left_out,
         "missing": list(group.missing),
+        "unobserved": _unobserved(result),
         "pointing": None if result.beam is None else beam_object(result.beam),
     }
+
+
+def _unobserved(result: PoseFindings) -> list[str]:
+    """Rotations that the points hardly determine."""
+    weak = weak_axis(result.pose.pose.covariance)
+    if weak is None:
+        return []
+    axis = ", ".join(f"{v:.3f}" for v in weak[0])
+    return [f"rotation about ({axis}): u {weak[1]:.2g} rad"]
 
 
 def beam_object(beam: PointingOffset) -> dict[str, Any]:
@@ -110,7 +121,8 @@ def pose_words(result: PoseFindings) -> list[tuple[str, str]]:
         passages.append(("Left out", f"{name}: |w| {w:.1f}, it moved separately"))
     if group.missing:
         some = ", ".join(group.missing[:6]) + (" ..." if len(group.missing) > 6 else "")
-        passages.append(("Missing", f"{len(group.missing)} points of the group are not in both epochs: {some}"))
+        count = f"{len(group.missing)} points are" if len(group.missing) > 1 else "one point is"
+        passages.append(("Missing", f"{count} not in both: {some}"))
     if result.beam is not None:
         across, along = result.beam.beam_deviation
         passages.append(

@@ -10,7 +10,7 @@ from catseye.gateways.writers.passage import Passage
 from catseye.optics.zernike import Numbering, number
 from catseye.reduction.surface.actuators import Actuators
 from catseye.reduction.surface.change import Change
-from catseye.reduction.surface.dish import TABLE, Dish
+from catseye.reduction.surface.dish import TABLE, DishDesign
 from catseye.reduction.surface.findings import SurfaceFindings
 from catseye.reduction.surface.lookup import Lookup
 from catseye.reduction.surface.shape import Expansion, Gain, MeanSquare, SurfaceShape
@@ -19,7 +19,7 @@ FORMAT = "catseye-surface-1"
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
 
 
-def dish_object(dish: Dish) -> dict[str, Any]:
+def dish_object(dish: DishDesign) -> dict[str, Any]:
     """Design as an object for JSON."""
     aperture, nominal = dish.aperture, dish.nominal
     return {

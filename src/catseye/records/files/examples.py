@@ -44,6 +44,15 @@ def example(name: str) -> Path:
     return place
 
 
+def name_of(path: Path) -> str:
+    """Path as a person reads it: of an example, the name that the commands take."""
+    try:
+        root = examples_directory()
+    except InputError:
+        return str(path)
+    return path.relative_to(root).as_posix() if path.is_relative_to(root) and path != root else str(path)
+
+
 def example_campaign() -> Path:
     """Path of the bundled campaign."""
     return example("night-01")

@@ -11,9 +11,11 @@ import numpy as np
 
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.records.files.covariance_file import part_of, stored_covariance
+from catseye.records.files.examples import name_of
+from catseye.records.files.point_table import read_point_table
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
-from catseye.records.files.verdicts import stored_verdict
+from catseye.records.files.verdicts import stored_verdict, verdict_of_table
 from catseye.records.network.written_pose import FILE as POSE_FILE
 from catseye.records.network.written_pose import NIGHT_POSE, read_written_pose
 from catseye.verdict import Verdict
@@ -31,7 +33,8 @@ class SolvedPoints:
     campaign     name
     names        n
     x            (n, 3) m
-    covariance   (3n, 3n) m^2; for many points mapped from a file, or an object that gives its parts
+    covariance   (3n, 3n) m^2, or (n, 3, 3) of independent points, zero for exact ones; for many points mapped from a
+                 file, or an object that gives its parts
     posture      azimuth and elevation, rad, from pose.json, if there
     hashes       SHA-256 of the files read, by name
     verdict      of the reduction; None if the file has none
@@ -63,6 +66,10 @@ class SolvedPoints:
         rows, columns = self.rows(names), self.rows(columns_of)
         if isinstance(self.covariance, JointPoints):
             return self.covariance.between(rows, columns)
+        if self.covariance.ndim == 3:
+            same = rows[:, None] == columns
+            blocks = self.covariance[rows][:, None] * same[:, :, None, None]
+            return np.asarray(blocks.transpose(0, 2, 1, 3).reshape(3 * len(rows), 3 * len(columns)))
         rows, columns = ((3 * points[:, None] + np.arange(3)).ravel() for points in (rows, columns))
         return part_of(self.covariance, rows, columns)
 
@@ -112,6 +119,32 @@ def read_solved_points(path: Path | str, *, averaged: bool = True) -> SolvedPoin
         verdict=stored_verdict(name, document),
         dish=dish,
         focal_length=focal_length,
+    )
+
+
+def read_points(path: Path | str, *, u: float | None = None) -> SolvedPoints:
+    """Points of an epoch: what `catseye reduce` wrote, or a CSV of any points (docs/formats/surface.md).
+
+    path   directory, coordinates.json or .csv
+    u      m, of each coordinate of a table without uncertainties, which is exact without
+
+    Raises InputError as `read_solved_points` and `read_point_table`.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".csv" or path.is_dir():
+        return read_solved_points(path)
+    folder = Folder(path.parent)
+    table = read_point_table(folder.text(path.name), path.name, u=u)
+    exact = np.zeros((len(table.names), 3, 3))
+    return SolvedPoints(
+        file=name_of(path),
+        campaign=path.stem,
+        names=table.names,
+        x=table.x,
+        covariance=exact if table.covariance is None else table.covariance,
+        posture=None,
+        hashes=folder.hashes,
+        verdict=verdict_of_table(path),
     )
 
 

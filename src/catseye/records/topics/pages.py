@@ -8,7 +8,7 @@ from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.records.files.refusal import shown
-from catseye.records.topics.markup import linked_pages, page_title, plain_markdown
+from catseye.records.topics.markup import has_prose, linked_pages, page_title, plain_markdown
 
 NEAR = 3  # names that a refusal proposes
 LIKENESS = 0.6  # of a proposed name, as difflib measures it
@@ -93,9 +93,12 @@ def topic_names() -> tuple[str, ...]:
 
 
 def topic_titles() -> dict[str, str]:
-    """Titles of all topics by name."""
-    files = {topic_name(page): path for page, path in _files().items()}
-    return {name: Topic(name, files[name].read_text(encoding="utf-8")).title for name in topic_names()}
+    """Titles of the topics by name, without pages that have no text before the documentation is built."""
+    files = _files()
+    pages = {topic_name(page): page for page in files}
+    topics = [Topic(name, files[pages[name]].read_text(encoding="utf-8")) for name in topic_names()]
+    folders = {name for name, page in pages.items() if page.endswith("/index")}
+    return {topic.name: topic.title for topic in topics if topic.name in folders or has_prose(topic.source)}
 
 
 def read_topic(name: str) -> Topic:

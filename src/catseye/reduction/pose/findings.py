@@ -39,13 +39,14 @@ class PoseFindings:
     def status(self) -> str:
         """Status "converged", or the evidence against the pose."""
         pose = self.pose.pose
+        suspicion = self.pose.suspicion and f"; {self.pose.suspicion}"
         if not pose.motion.converged:
-            return pose.motion.status
+            return f"{pose.motion.status}{suspicion}"
         if not self.rigid:
             what = "the pose, and the beam that follows from it," if self.beam is not None else "the pose"
             return (
                 f"the group does not move as one (p {pose.p:.2g}): {what} is a mean of its points' motions; "
-                "see residuals"
+                f"see residuals{suspicion}"
             )
         return CONVERGED
 
@@ -64,6 +65,8 @@ class PoseFindings:
             return Verdict("doubtful", self.status)
         if not pose.motion.degrees_of_freedom:
             return Verdict("doubtful", "as many coordinates as unknowns: nothing checks that the group moved as one")
+        if self.pose.suspicion:
+            return Verdict("doubtful", self.pose.suspicion)
         if self.pose.posture is not None and self.pose.posture.doubt:
             return Verdict("doubtful", self.pose.posture.doubt)
         removed = f", {len(pose.left_out)} left out" if pose.left_out else ""

@@ -51,6 +51,7 @@ class GroupPose:
     epoch     the later one
     earlier   the earlier one; None against the design
     posture   direction of a part carried by the telescope, minus the commanded posture; None for others
+    suspicion probable mistake or point that prevents a rigid motion, as a text; "" for none
     """
 
     group: str
@@ -61,6 +62,7 @@ class GroupPose:
     epoch: SolvedPoints
     earlier: SolvedPoints | None = None
     posture: PostureOffset | None = None
+    suspicion: str = ""
 
 
 def at_posture(site: SiteFolder, azimuth: float, elevation: float) -> SiteFolder:

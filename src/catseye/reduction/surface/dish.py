@@ -20,7 +20,7 @@ Size = Literal["radius_m", "diameter_m"]
 
 
 @dataclass(frozen=True, eq=False)
-class Dish:
+class DishDesign:
     """Design of a dish.
 
     aperture   illuminated part, with the focal length
@@ -39,7 +39,7 @@ class Dish:
     size: Size = "radius_m"
 
     @classmethod
-    def of_site(cls, site: SiteFolder) -> "Dish":
+    def of_site(cls, site: SiteFolder) -> "DishDesign":
         """Dish of a site's records; its surface stands on actuators."""
         places = {
             name: np.array(target.position_mm) * MILLIMETRE
@@ -58,7 +58,7 @@ class Dish:
         vertex: np.ndarray,
         axis: np.ndarray,
         size: Size = "radius_m",
-    ) -> "Dish":
+    ) -> "DishDesign":
         """Dish without a site.
 
         focal_length   m
@@ -83,7 +83,7 @@ class Dish:
 
     @property
     def noun(self) -> str:
-        """Word for its points."""
+        """Name of its points in messages."""
         return "points" if self.site is None else "prisms"
 
     @property

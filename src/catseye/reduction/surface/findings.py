@@ -15,7 +15,7 @@ from catseye.estimation.shapes.paraboloid import ParaboloidStatus
 from catseye.reduction.site.posture import SURE, largest_correction
 from catseye.reduction.surface.actuators import Actuators, Travel, actuators_of, corrections
 from catseye.reduction.surface.change import Change, change_between
-from catseye.reduction.surface.dish import Dish
+from catseye.reduction.surface.dish import DishDesign
 from catseye.reduction.surface.lookup import Lookup, lookup_of
 from catseye.reduction.surface.placement import DishPlacement, placement_of
 from catseye.reduction.surface.shape import Prisms, ShapeSettings, SurfaceShape, fitted_frame, shape_of
@@ -34,7 +34,7 @@ class SurfaceFindings:
     placements   of each shape's points on it
     """
 
-    dish: Dish
+    dish: DishDesign
     shapes: tuple[SurfaceShape, ...]
     change: Change | None = None
     lookup: Lookup | None = None
@@ -53,7 +53,7 @@ class SurfaceFindings:
 
 def reduce_surface(
     epochs: Sequence[Prisms],
-    dish: Dish,
+    dish: DishDesign,
     settings: ShapeSettings,
     *,
     actuators: bool = False,
@@ -136,7 +136,7 @@ def _of_lookup(result: SurfaceFindings) -> Verdict:
     return Verdict("good", f"a look-up table of {len(result.shapes)} epochs, which scatter about it as they claim")
 
 
-def _implausible(shape: SurfaceShape, dish: Dish) -> str:
+def _implausible(shape: SurfaceShape, dish: DishDesign) -> str:
     """Implausible property of a fit, as a text; "" if plausible.
 
     The surface lies within the largest deviation t, of a site's dish the actuators' travel; so does a change of focal

@@ -13,7 +13,7 @@ import numpy as np
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.paraboloid import PARAMETERS, POSE, PlacedParaboloid, place_paraboloid
 from catseye.geometry.frames.frame import Transform
-from catseye.reduction.surface.dish import Dish
+from catseye.reduction.surface.dish import DishDesign
 from catseye.reduction.surface.shape import Prisms
 
 RIM = 0.05  # of the radius: corners of panels stand up to 0.028 outside the circle (examples/sites/gbt)
@@ -37,7 +37,7 @@ class DishPlacement:
     reach      distance of the farthest point from the middle of the aperture, in units of its radius
     """
 
-    dish: Dish
+    dish: DishDesign
     inside: int
     outside: np.ndarray
     deviation: float
@@ -84,7 +84,7 @@ class DishPlacement:
         return "check focal length, size, units, and vertex and axis, which must be roughly right"
 
 
-def placement_of(prisms: Prisms, dish: Dish) -> DishPlacement:
+def placement_of(prisms: Prisms, dish: DishDesign) -> DishPlacement:
     """Position of points on a dish, and axis changes that fit.
 
     prisms   as measured
@@ -109,7 +109,7 @@ def _changes(local: np.ndarray) -> list[tuple[str, np.ndarray]]:
     return changed
 
 
-def _placed(names: tuple[str, ...], local: np.ndarray, dish: Dish) -> DishPlacement:
+def _placed(names: tuple[str, ...], local: np.ndarray, dish: DishDesign) -> DishPlacement:
     fit = _own_paraboloid(local, dish)
     if fit is not None and dish.site is None:
         local = fit.local
@@ -125,7 +125,7 @@ def _placed(names: tuple[str, ...], local: np.ndarray, dish: Dish) -> DishPlacem
     )
 
 
-def _own_paraboloid(local: np.ndarray, dish: Dish) -> PlacedParaboloid | None:
+def _own_paraboloid(local: np.ndarray, dish: DishDesign) -> PlacedParaboloid | None:
     """Paraboloid through points (k, 3) m; None where none fits roughly in place.
 
     Of the design's focal length; without a site of the points' own, where they determine it.
@@ -145,7 +145,7 @@ def _small(rotation: np.ndarray) -> bool:
     return bool(np.linalg.norm(rotation) < 0.5)
 
 
-def _elsewhere(names: tuple[str, ...], local: np.ndarray, dish: Dish) -> tuple[str, ...]:
+def _elsewhere(names: tuple[str, ...], local: np.ndarray, dish: DishDesign) -> tuple[str, ...]:
     """Prisms nearer to another's design place than to their own."""
     from scipy.spatial import cKDTree
 

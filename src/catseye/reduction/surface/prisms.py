@@ -12,6 +12,7 @@ from catseye.estimation.least_squares.covariance import Dense, JointPoints
 from catseye.geometry.antenna.frames import ground_from_reflector
 from catseye.geometry.frames.frame import Transform
 from catseye.records.files.columns import TextColumns, columns_of
+from catseye.records.files.examples import name_of
 from catseye.records.files.point_table import read_point_table, refuse_far, require_uncertainty
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import refusal, shown
@@ -21,7 +22,7 @@ from catseye.records.network.written_pose import FILE as POSE_FILE
 from catseye.records.network.written_pose import NIGHT_POSE, read_written_pose
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.epoch import Reduction
-from catseye.reduction.surface.dish import Dish
+from catseye.reduction.surface.dish import DishDesign
 from catseye.reduction.surface.shape import Prisms
 
 Frame = Literal["reflector", "ground"]
@@ -49,7 +50,7 @@ class EpochPlace(NamedTuple):
     u: float | None = None
 
 
-def read_prisms(source: Path, dish: Dish, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
+def read_prisms(source: Path, dish: DishDesign, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
     """Prisms of one epoch, and SHA-256 of each input file.
 
     source   directory of `catseye reduce --out`, or a CSV of docs/formats/surface.md
@@ -127,7 +128,7 @@ def _reduced(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms,
         points=solved.places(solved.dish),
         covariance=JointPoints(Dense(block), np.arange(len(block)).reshape(-1, 3)),
         nominal=_frame(site, azimuth, elevation),
-        source=str(source),
+        source=name_of(source),
         elevation_deg=elevation,
         azimuth_deg=azimuth,
         temperature_c=place.temperature_c,
@@ -136,7 +137,7 @@ def _reduced(source: Path, site: SiteFolder, place: EpochPlace) -> tuple[Prisms,
     return prisms, solved.hashes
 
 
-def _table(source: Path, dish: Dish, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
+def _table(source: Path, dish: DishDesign, place: EpochPlace) -> tuple[Prisms, dict[str, str]]:
     folder = Folder(source.parent)
     text = folder.text(source.name)
     fitted = "x_dish_m" in text.partition("\n")[0]
@@ -156,7 +157,7 @@ def _table(source: Path, dish: Dish, place: EpochPlace) -> tuple[Prisms, dict[st
         points=points,
         covariance=covariance,
         nominal=_nominal(source.name, dish, place),
-        source=str(source),
+        source=name_of(source),
         elevation_deg=place.elevation_deg,
         azimuth_deg=place.azimuth_deg,
         temperature_c=place.temperature_c,
@@ -169,7 +170,7 @@ def prisms_of_points(
     points: np.ndarray,
     covariance: np.ndarray,
     names: Sequence[str],
-    dish: Dish,
+    dish: DishDesign,
     place: EpochPlace,
     *,
     source: str = "points",
@@ -218,7 +219,7 @@ def independent(u: np.ndarray) -> np.ndarray:
     return np.asarray(u[:, :, None] * np.eye(3) * u[:, None, :])
 
 
-def _nominal(source: str, dish: Dish, place: EpochPlace) -> Transform:
+def _nominal(source: str, dish: DishDesign, place: EpochPlace) -> Transform:
     """Outer frame from the nominal paraboloid's."""
     if dish.nominal is not None:
         return dish.nominal

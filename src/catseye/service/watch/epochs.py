@@ -294,7 +294,7 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     """
     from catseye.errors import EstimationError
     from catseye.optics.zernike import number as term_number
-    from catseye.reduction.surface.dish import Dish
+    from catseye.reduction.surface.dish import DishDesign
     from catseye.reduction.surface.findings import reduce_surface
     from catseye.reduction.surface.prisms import EpochPlace, prisms_of_points
     from catseye.reduction.surface.shape import ShapeSettings
@@ -306,7 +306,7 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     if covariance is None or not rows:
         return _no_surface(record, "no prism of the dish has a covariance")
     at = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
-    dish = Dish.of_site(records)
+    dish = DishDesign.of_site(records)
     posture = (record.answer["azimuth"] / DEGREE, record.answer["elevation"] / DEGREE)
     prisms = prisms_of_points(
         places[rows],
