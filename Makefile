@@ -7,7 +7,7 @@ STAMP := .venv/.catseye-installed
 WORKERS ?= $(shell $(PYTHON) -c 'import os; print(1 + (len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()))')
 PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
-.PHONY: help setup check style types test tests test-all test-web front front-check docs demo bench bench-guard release lower-bounds clean
+.PHONY: help setup check style types test tests test-all test-web front front-check docs demo evidence bench bench-guard release lower-bounds clean
 
 help:  ## list the verbs
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -60,12 +60,15 @@ front-check: front/node_modules  # types, and the committed files against a new 
 	diff -r front/built/web src/catseye/web/static
 	diff -r front/built/report src/catseye/gateways/writers/static
 
-docs: setup  ## the documentation in docs/_build/html: strict, every cell executed, opens from disk
+docs: setup  ## the documentation in docs/_build/html: strict, every command executed, links and words checked, opens from disk
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[docs]'
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --jobs 2 -b html docs docs/_build/html
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/docs/make_docs.py docs docs/_build
 
 demo: setup  ## a night of raw samples from 18 rangers to coordinates, with a report in demo-night-01/
 	$(BIN)/catseye demo demo-night-01
+
+evidence: setup  ## scatter against claims, wrong records, peers' answers: writes docs/evidence/how-good.md
+	PYTHONPATH=tests OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/evidence/run.py
 
 bench: setup  ## all benchmarks beside others and the machine's limit, in one table: writes docs/benchmarks.md
 	$(BIN)/python benchmarks/run.py --write

@@ -18,6 +18,9 @@ extensions = [
     "command_line",
     "commands",
     "docstrings",
+    "drawings",
+    "gallery",
+    "glossary",
     "myst_nb",
     "python_reference",
     "references",
@@ -29,7 +32,7 @@ extensions = [
 exclude_patterns = ["_build", "_templates", "extensions"]
 templates_path = ["_templates"]
 default_role = "code"
-language = "en_GB"
+language = "en"
 highlight_language = "text"
 nitpicky = True
 nitpick_ignore_regex = [
@@ -64,9 +67,11 @@ html_title = f"catseye {release}"
 html_favicon = "_static/icon.svg"
 html_static_path = ["_static"]
 html_css_files = ["catseye.css"]
+html_js_files = ["catseye.js"]
 html_copy_source = False
 html_show_sourcelink = False
 html_show_search_summary = False  # would be fetched, which a browser refuses where pages are opened from disk
+html_context = {"default_mode": "auto"}
 html_theme_options = {
     "logo": {"image_light": "_static/logo.svg", "image_dark": "_static/logo-dark.svg", "alt_text": "catseye"},
     "icon_links": [],

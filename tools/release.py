@@ -38,6 +38,8 @@ def require_described(version: str) -> None:
     """BuildError where the changelog has no section of this version, or HEAD is not what lies here."""
     if f"\n## {version}\n" not in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"):
         raise BuildError(f"CHANGELOG.md has no section '## {version}'")
+    if f'\nversion: "{version}"\n' not in (ROOT / "CITATION.cff").read_text(encoding="utf-8"):
+        raise BuildError(f'CITATION.cff has not version: "{version}"')
     status = subprocess.run(
         ["git", "status", "--porcelain", "--untracked-files=no"], cwd=ROOT, check=True, capture_output=True, text=True
     )

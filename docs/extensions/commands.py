@@ -24,8 +24,8 @@ from catseye.cli.commands import app, join_commands
 from catseye.cli.completion import words_of
 
 VERBS = ("plot",)  # groups whose name is the verb
+NAMES = {"help": "topic"}  # commands whose function has another name
 OF_SEVERAL = {"reduce": "reduce_nights", "replay": "replay_journals", "simulate": "simulate_runs"}
-SERVERS = ("zy", "ziy", "serve", "view")
 TYPES = {bool: "flag", int: "integer", float: "number", str: "text", Path: "path"}
 WIDTH = 76  # characters of a synopsis
 PROBES = (float("nan"), -1e30, 1e30)  # values that no range holds
@@ -51,7 +51,7 @@ def _within(group: Any, words: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
 def functions(words: str) -> list[str]:
     """Names of the Python functions that do a command's work: of one input, and of several."""
     parts = words.split()
-    name = "_".join(parts if parts[0] in VERBS else reversed(parts)).replace("-", "_")
+    name = NAMES.get(words) or "_".join(parts if parts[0] in VERBS else reversed(parts)).replace("-", "_")
     return [each for each in (name, OF_SEVERAL.get(words)) if each and hasattr(catseye, each)]
 
 

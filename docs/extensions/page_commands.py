@@ -15,6 +15,9 @@ SOURCE = Path(__file__).resolve().parents[2] / "src"
 WIDTH = 100  # columns of a terminal block
 LONGEST = 300.0  # s that one command may take
 ANSI = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)|[@-Z\\-_])")
+PROGRESS = re.compile(  # lines of a slow machine: "reducing nights 1 of 2, 10 s, some 10 s left", "adjusting 20"
+    r"(?m)^(?:[a-z][^\n:]* \d+(?: of \d+)?(?:, for [^\n]+|, [^\n]+ left)|adjusting \d+)(?:\n|$)"
+)
 FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})\{(?P<kind>command(?:-file|-figure)?)\}[ \t]*(?P<argument>.*)$")
 OPTION = re.compile(r"^:(?P<name>[a-z-]+):[ \t]*(?P<value>.*)$")
 
@@ -145,9 +148,9 @@ class PageDirectory:
         return {**os.environ, **terminal, "PATH": path, "PYTHONPATH": search, "OPENBLAS_NUM_THREADS": "1"}
 
     def _shown(self, printed: str) -> str:
-        """Printed text as a page shows it: no colours, no overwritten lines, no path of this machine."""
+        """Printed text as a page shows it: no colours, no progress, no overwritten lines, no path of this machine."""
         plain = ANSI.sub("", printed).replace("\r\n", "\n")
         plain = "\n".join(line.rsplit("\r", 1)[-1].rstrip() for line in plain.split("\n"))
         for place in (self.path.resolve(), self.path):
             plain = plain.replace(f"{place}/", "").replace(str(place), ".")
-        return plain.strip("\n")
+        return PROGRESS.sub("", plain).strip("\n")

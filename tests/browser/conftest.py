@@ -98,10 +98,12 @@ def chromium():
 
 @pytest.fixture
 def watched(chromium):
-    """A function that opens pages: `watched(url, width="phone", scheme="dark", token=True)`."""
+    """A function that opens pages: `watched(url, width="phone", scheme="dark", root="file:///site")`."""
     contexts = []
 
-    def opened(url: str, *, width: str = "laptop", scheme: str = "light", offline: bool = False) -> Watched:
+    def opened(
+        url: str, *, width: str = "laptop", scheme: str = "light", offline: bool = False, root: str | None = None
+    ) -> Watched:
         wide, high = WIDTHS[width]
         context = chromium.new_context(
             viewport={"width": wide, "height": high}, color_scheme=scheme, reduced_motion="reduce", offline=offline
@@ -109,7 +111,7 @@ def watched(chromium):
         contexts.append(context)
         page = context.new_page()
         watch = Watched(page)
-        here = url.split("/#")[0].split("?")[0]
+        here = root or url.split("/#")[0].split("?")[0]
 
         def requested(address: str) -> None:
             host = here.removeprefix("http")

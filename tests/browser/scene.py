@@ -136,10 +136,13 @@ class Watched:
         assert not self.errors, self.errors
         assert not self.elsewhere, self.elsewhere
 
-    def axe(self) -> list[str]:
-        """Serious and critical findings of axe-core."""
+    def axe(self, *, preload: bool = True) -> list[str]:
+        """Serious and critical findings of axe-core.
+
+        preload   False: style sheets are not asked for once more, which a browser refuses for files
+        """
         self.page.evaluate(AXE.read_text())
-        found = self.page.evaluate("axe.run()")["violations"]
+        found = self.page.evaluate("preload => axe.run({ preload })", preload)["violations"]
         return [
             f"{each['id']}: {each['nodes'][0]['html'][:200]}"
             for each in found

@@ -21,7 +21,8 @@ from catseye.cli.commands import app, join_commands
 from contracts.table_scene import tables
 from repository import ROOT
 
-LIST = ROOT / "tests" / "vectors" / "stable-0.9.toml"
+MINOR = ".".join(catseye.__version__.split(".")[:2])
+LIST = ROOT / "tests" / "vectors" / f"stable-{MINOR}.toml"
 WIDTH = 120
 KEY = re.compile(r"[a-z][a-z0-9_]*")  # of a name in JSON; others are data, such as names of rangers
 WEATHER = "--temperature-c 20 --pressure-hpa 933 --humidity-percent 50"
@@ -225,7 +226,7 @@ def _options_lost(old, now):
 def page_text(now):
     """Text of the list."""
     text = [
-        "# Names that users may rely on in releases 0.9.x, and one minor release beyond their deprecation.",
+        f"# Names that users may rely on in releases {MINOR}.x, and one minor release beyond their deprecation.",
         "# Written by tests/contracts/stable_scene.py; a name that is removed fails tests/contracts/test_stable.py.",
         "# functions: name= has a default, names after * are keywords. commands: --option! and FILE are required,",
         "# FILE? is not, ... takes several. objects: keys of --json. columns: of the tables in docs/formats.",

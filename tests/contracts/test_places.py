@@ -17,6 +17,7 @@ ROOMS = sorted(path.name for path in PACKAGE.iterdir() if (path / "__init__.py")
 HISTORY: dict[tuple[str, str], str] = {}
 
 FILE = re.compile(r"(?<![\w/.-])(?:[\w-]+/)+[\w-]+\.py\b")
+ADDED = re.compile(r"^```\{code-block\} python\n:caption: (\S+)$", re.MULTILINE)  # by a walkthrough
 DOTTED = re.compile(rf"`((?:catseye|{'|'.join(ROOMS)})(?:\.[A-Za-z_]\w*)+)(?=[`(\[ ])")
 COMMAND = re.compile(r"(?:`|bin/)catseye ([a-z][a-z-]*)")
 JOINED = re.compile(r'@app\.command\((?:"([\w-]+)")?.*?\ndef (\w+)|\bapp\.add_typer\(\w+, name="([\w-]+)"', re.DOTALL)
@@ -41,8 +42,14 @@ def strays(mention: re.Pattern[str], is_there) -> list[str]:
     ]
 
 
+@cache
+def added() -> set[str]:
+    """Files that a walkthrough of docs/howto adds."""
+    return {name for text in texts().values() for name in ADDED.findall(text)}
+
+
 def file_is_there(name: str) -> bool:
-    return any((folder / name).is_file() for folder in BESIDE)
+    return name in added() or any((folder / name).is_file() for folder in BESIDE)
 
 
 @cache
@@ -70,6 +77,8 @@ def members_of(node: ast.AST) -> set[str]:
 @cache
 def dotted_is_there(name: str) -> bool:
     """Whether a dotted name, from `catseye` or from a room, leads to a module, to its attribute, or to a member."""
+    if f"src/catseye/{name.replace('.', '/')}.py" in added():
+        return True
     here, parts = PACKAGE, name.removeprefix("catseye.").split(".")
     while parts and (here / parts[0] / "__init__.py").is_file():
         here, parts = here / parts[0], parts[1:]

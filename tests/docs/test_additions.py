@@ -24,6 +24,7 @@ BLOCK = re.compile(
     r"^```\{code-block\} (\w+)\n:caption: (\S+)\n((?::[a-z-]+:[^\n]*\n)*)(.*?)^```$", re.MULTILINE | re.DOTALL
 )
 PYTEST = re.compile(r"^\$ \.venv/bin/python -m pytest (.+)$", re.MULTILINE)
+MAKER = re.compile(r"^\$ \.venv/bin/python (examples/.+)$", re.MULTILINE)
 OPTIONAL = ":class: optional"  # of a block that no test asks for
 
 
@@ -81,13 +82,17 @@ def copy(place):
 
 
 def run_tests(page, place):
-    """Exit status of the tests that a page names, in a copy, and their output."""
-    [targets] = PYTEST.findall(page.read_text(encoding="utf-8"))
+    """Exit status of the tests that a page names, in a copy, and their output; makers of examples run before."""
+    text = page.read_text(encoding="utf-8")
+    [targets] = PYTEST.findall(text)
     path = os.pathsep.join([str(place / "src"), str(place / "tests"), os.environ.get("PYTHONPATH", "")])
+    environment = {**os.environ, "PYTHONPATH": path}
+    for maker in MAKER.findall(text):
+        subprocess.run([sys.executable, *shlex.split(maker)], cwd=place, env=environment, check=True)
     return subprocess.run(
         [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *shlex.split(targets)],
         cwd=place,
-        env={**os.environ, "PYTHONPATH": path},
+        env=environment,
         capture_output=True,
         text=True,
         check=False,

@@ -1,32 +1,11 @@
 """Networks with answers from elsewhere: a textbook, established programs, an independent solver; see SOURCE."""
 
-import csv
-
 import numpy as np
 import pytest
 
 from catseye.estimation.network.adjustment import adjust_network
 from catseye.records.network.any_file import read_network
-from repository import TESTS
-
-NETWORKS = TESTS / "vectors" / "networks"
-
-
-def answers(path):
-    """Names, coordinates and standard uncertainties in m, as printed by others."""
-    with path.open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    name = next(iter(rows[0]))
-    keys, unit = (("sx_mm", "sy_mm", "sz_mm"), 1e-3) if "sx_mm" in rows[0] else (("u_x", "u_y", "u_z"), 1.0)
-    x = np.array([[float(row[k]) for k in "xyz"] for row in rows])
-    return [row[name] for row in rows], x, unit * np.array([[float(row[k]) for k in keys] for row in rows])
-
-
-def ours(solution, names):
-    """The same of a solution, in the axes of the file."""
-    axes, rows = solution.network.axes, [solution.index[name] for name in names]
-    covariance = axes.T @ solution.covariance[rows] @ axes
-    return solution.x[rows] @ axes, np.sqrt(np.einsum("nii->ni", covariance))
+from evidence.networks import NETWORKS, answers, ours
 
 
 def test_baumanns_point():

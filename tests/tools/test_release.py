@@ -24,7 +24,7 @@ def copied(directory):
     left_out = shutil.ignore_patterns("__pycache__", "_build", ".pytest_cache")
     for name in ("src", "docs", "examples"):
         shutil.copytree(ROOT / name, directory / name, ignore=left_out)
-    for name in ("pyproject.toml", "README.md", "LICENSE", ".gitignore"):
+    for name in ("pyproject.toml", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", ".gitignore"):
         shutil.copy2(ROOT / name, directory / name)
     return directory
 

@@ -28,7 +28,7 @@ ROOMS = (
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples", "help"),
-    "A night of ranges": ("reduce", "explain", "night"),
+    "A night of ranges": ("reduce", "explain", "budget", "night"),
     "Networks": ("adjust", "plan", "design", "baseline"),
     "The telescope": ("pose", "surface", "pointing", "structure", "panels"),
     "Laboratory": ("calibrate", "certificate", "triplet"),
@@ -138,7 +138,7 @@ Job = Annotated[
 )
 def catseye(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Laser metrology for large telescopes and structures: raw samples to coordinates, with uncertainty."""

@@ -3,7 +3,7 @@
 import pytest
 
 from catseye.records.topics.formulas import plain_formula
-from catseye.records.topics.markup import linked_pages, page_title, plain_markdown
+from catseye.records.topics.markup import has_prose, linked_pages, page_title, plain_markdown
 
 PAGE = """---
 kernelspec:
@@ -106,6 +106,42 @@ def test_plain_markdown_stays_as_it_is():
 def test_the_title_is_the_first_heading_outside_code():
     assert page_title("```\n# no\n```\n# Yes `code`\n") == "Yes code"
     assert page_title("no heading") == ""
+
+
+@pytest.mark.parametrize(
+    ("page", "text"),
+    [
+        ("```{command-file} a.csv\nx,y\n```\n", "File `a.csv`:\n\n```text\nx,y\n```\n"),
+        ("```{command}\n:hide:\ncatseye air\n```\nWords.\n", "Words.\n"),
+        (
+            ":::{grid-item-card} Tour\n:link: tour/index\n:link-type: doc\n\nPages.\n:::\n",
+            "**Tour** (`catseye help tour`)\n\nPages.\n",
+        ),
+        ("```{command-reference} air\n```\n", "Options: `catseye air --help`\n"),
+        ("```{public} air sound\n```\n", "In Python: `help(catseye.air)`, `help(catseye.sound)`\n"),
+        ("```{formulas} catseye.signal.drift\n```\n", "In Python: `help('catseye.signal.drift')`\n"),
+        ("```{references}\n```\n", "In Python: `from catseye.bibliography import SOURCES`\n"),
+        (
+            "```{gallery} catseye.air(1)\n:command: catseye air\n\nplan = From above\n```\n",
+            "Figures of `catseye air`:\n\n- plan: From above\n",
+        ),
+    ],
+)
+def test_what_the_build_makes_is_said_in_words(page, text):
+    assert plain_markdown(page) == text
+
+
+@pytest.mark.parametrize(
+    ("page", "prose"),
+    [
+        ("# A\n\n```{formulas} a.b\n```\n", False),
+        ("# A\n\n```{eval-rst}\n.. x::\n```\n", False),
+        ("# A\n\nWords.\n", True),
+        ("# A\n\n```{command-reference} air\n```\n", True),
+    ],
+)
+def test_a_page_has_prose_or_waits_for_the_build(page, prose):
+    assert has_prose(page) is prose
 
 
 def test_linked_pages_are_those_of_the_prose():

@@ -12,8 +12,14 @@ def test_every_page_is_a_topic_with_a_title():
     root = documentation_directory()
     pages = [p for p in root.rglob("*.md") if not any(part.startswith("_") for part in p.relative_to(root).parts)]
     assert len(topic_names()) == len(pages) > 60
-    assert list(topic_titles()) == list(topic_names())
     assert all(topic_titles().values())
+
+
+def test_pages_that_only_the_build_fills_are_not_listed():
+    titles = topic_titles()
+    assert list(titles) == [name for name in topic_names() if name in titles]
+    assert {"conventions", "formats", "reference"} <= set(titles)
+    assert "reference/python/formulas/signal-drift" in set(topic_names()) - set(titles)
 
 
 def test_an_index_has_the_name_of_its_folder_and_leads_to_its_pages():

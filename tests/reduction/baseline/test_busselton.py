@@ -4,8 +4,6 @@ No certificate of the pillars is in the data: the numbers kept here are what thi
 below agree on, not a truth from elsewhere.
 """
 
-import csv
-
 import numpy as np
 import pytest
 from scipy.stats import f
@@ -20,10 +18,9 @@ from catseye.records.laboratory.baseline import (
 )
 from catseye.reduction.baseline.instrument import calibrate_baseline, record_values
 from catseye.reduction.baseline.settings import BaselineSettings
-from repository import ROOT
+from evidence.baselines import DATA, TS30, solved_by_hand
 
-DATA = ROOT / "examples" / "baselines" / "busselton"
-TS30, TS16 = "ts30-baseline-observations.csv", "ts16-calibration-observations.csv"
+TS16 = "ts16-calibration-observations.csv"
 
 
 @pytest.fixture(scope="module")
@@ -48,30 +45,6 @@ def ts16(known, heights):
     return calibrate_baseline(read_observations(DATA / TS16), heights, known)
 
 
-def by_hand(file, y):
-    """Horizontal distances and their sines, with the closed formula of the index (IAG 1999), flat earth but for scale.
-
-    Nothing of catseye: 0.07 ppm between the two indices is 0.04 mm at 510 m, and nearly all of it scale.
-    """
-    with (DATA / "pillar-heights.csv").open() as stream:
-        top = {r["pillar_name"]: float(r["pillar_rl"]) for r in csv.DictReader(stream)}
-    with (DATA / file).open() as stream:
-        rows = list(csv.DictReader(stream))
-    d, t, p, h, hi, ht = (
-        np.array([float(r[k]) for r in rows])
-        for k in ("slope_distance", "temperature", "pressure", "humidity", "height_of_instrument", "height_of_target")
-    )
-    vapour = h / 100 * 6.1121 * np.exp(17.502 * t / (240.97 + t)) * 1.004  # Magnus form, over water
-    lam = 0.658
-    standard = 287.6155 + 4.88660 / lam**2 + 0.06800 / lam**4
-    n = 1 + 1e-6 * (273.15 / 1013.25 * standard * p / (273.15 + t) - 11.27 * vapour / (273.15 + t))
-    a, b = (np.array([top[r[k]] for r in rows]) for k in ("from_pillar", "to_pillar"))
-    rise = b + ht - a - hi
-    level = np.sqrt((d * 1.000286338 / n) ** 2 - rise**2) * (1 - ((a + hi + b + ht) / 2 - top["1"]) / 6_371_000)
-    i, j = (np.array([int(r[k]) - 1 for r in rows]) for k in ("from_pillar", "to_pillar"))
-    return i, j, np.sqrt(level**2 - (y[j] - y[i]) ** 2)
-
-
 def test_the_reference_index_is_the_closed_formula_at_the_makers_standard_air():
     """286.338 at 12 °C, 1013.25 hPa, 60 %: the closed formula; Ciddor and Hill give 286.296, 0.042 ppm less."""
     from catseye.atmosphere.index.air import group_refractivity
@@ -85,18 +58,10 @@ def test_the_reference_index_is_the_closed_formula_at_the_makers_standard_air():
 
 
 def test_all_shots_agree_with_least_squares_by_hand(ts30):
-    i, j, d = by_hand(TS30, ts30.solution.y)
-    a = np.zeros((len(d), 6))
-    for k in range(len(d)):
-        for pillar, sign in ((i[k], -1), (j[k], 1)):
-            if pillar:
-                a[k, pillar - 1] += sign * np.sign(j[k] - i[k])
-    a[:, 5] = 1.0
-    values, *_ = np.linalg.lstsq(a, d, rcond=None)
-    s = np.sqrt(np.sum((d - a @ values) ** 2) / (127 - 6))
-    assert ts30.all_shots.zero == pytest.approx(values[5], abs=2e-6)
+    x, zero, s = solved_by_hand(ts30.solution.y)
+    assert ts30.all_shots.zero == pytest.approx(zero, abs=2e-6)
     assert ts30.all_shots.s == pytest.approx(s, abs=4e-6)  # 0.5 %: how the formulas grow with temperature
-    assert ts30.all_shots.x[1:] == pytest.approx(values[:5], abs=5e-5)  # the two formulas of the index
+    assert ts30.all_shots.x[1:] == pytest.approx(x, abs=5e-5)  # the two formulas of the index
 
 
 def test_the_ts30_calibrates_the_baseline_and_itself(ts30):

@@ -27,7 +27,7 @@ def serve(  # noqa: PLR0913 - its options are its command line
     screen: Screen = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run a site until it is told to end (SIGTERM: status 0): children are started again, everything is logged."""
+    """Run a site until stopped (SIGTERM exits 0); restart its processes, log everything."""
     from catseye.api.live.serving import serve as run
 
     end = run(

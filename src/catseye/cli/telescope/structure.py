@@ -89,9 +89,11 @@ def structure(  # noqa: PLR0913 - its options are its command line
         bool, typer.Option("--scatter/--no-scatter", help="Estimate of the scatter between epochs (wind).")
     ] = True,
     independent: Annotated[
-        bool, typer.Option("--independent", help="Points of an epoch are independent: for many hundred.")
+        bool, typer.Option("--independent", help="Ignore correlations between points (for several hundred points).")
     ] = False,
-    folds: Annotated[int, typer.Option("--folds", min=0, help="Stretches of epochs left out in turn; 0: none.")] = 5,
+    folds: Annotated[
+        int, typer.Option("--folds", min=0, help="Cross-validation folds of consecutive epochs; 0 for none.")
+    ] = 5,
     predict_deg: Annotated[
         list[float] | None,
         typer.Option("--predict", metavar="ELEVATION", help="Elevation of a prediction, degrees; repeats."),

@@ -21,6 +21,14 @@ from catseye.estimation.deformation.epoch_model import DatumConnection, EpochMod
 from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.model import NetworkSolution
 
+DATUM_WORDS = {  # allowed differences of the datums, keys of `DATUMS`
+    "absolute": "both epochs are in one datum: coordinates are compared as they stand",
+    "translation": "the datums may differ by a shift",
+    "levelled": "the datums may differ by a shift and a rotation about the vertical",
+    "levelled similarity": "the datums may differ by a shift, a rotation about the vertical and a scale",
+    "rigid": "the datums may differ by a shift and a rotation",
+    "similarity": "the datums may differ by a shift, a rotation and a scale",
+}
 LARGEST = 700  # common points of one joint test, whose work grows with their number cubed
 
 
@@ -219,7 +227,7 @@ def _apart(model: EpochModel, moved: np.ndarray, same_point: float) -> dict[str,
 
 def _words(movements: PointMovements, options: ComparisonOptions, common_fixed: Sequence[str]) -> list[str]:
     """Assumptions and results, one line each."""
-    words = [f"datums may differ as {movements.deformation.datum!r}"]
+    words = [DATUM_WORDS[movements.deformation.datum]]
     if movements.carried:
         words[0] = (
             f"the second epoch fixes {listed(movements.carried)} at the first's result: its errors are propagated, and "

@@ -197,7 +197,10 @@ class Differences:
     def holds(self, stable: np.ndarray) -> bool:
         """True if these points (n,) bool determine every observable datum motion."""
         motions = self._visible
-        return bool(np.linalg.matrix_rank(motions[np.repeat(stable, 3) & self.used]) == motions.shape[1])
+        rows, count = motions[np.repeat(stable, 3) & self.used], motions.shape[1]
+        if len(rows) < count or count == 0:  # numpy 2.0 has no rank of an empty matrix
+            return count == 0
+        return bool(np.linalg.matrix_rank(rows) == count)
 
     def fit(self, extra: np.ndarray | None = None, called: Sequence[str] = ()) -> LinearEstimate:
         """Best fit of the differences by datum motions and extra columns (3n, k)."""

@@ -32,6 +32,7 @@ def _recording(traces: Sequence["ChannelTrace"]) -> Figure:
             ax.axvline(trace.arrival * 1e3, color=BAD, lw=1.0)
         ax.set_title(f"{trace.channel}, {DIRECTIONS[trace.channel]} ({trace.file})")
         ax.margins(x=0.0)
+    figure.supylabel("signal (units of the recorder)", fontsize=9.0)
     figure.supxlabel("time since the file's first sample (ms); red line: detected arrival", fontsize=9.0)
     return figure
 
@@ -51,6 +52,7 @@ def _correlation(traces: Sequence["ChannelTrace"]) -> Figure:
             ax.axhline(0.0, color=FAINT, lw=0.6)
         wide.set_title(f"{trace.channel}, {DIRECTIONS[trace.channel]}")
         wide.margins(x=0.0)
+    figure.supylabel("correlation (units of the recorder)", fontsize=9.0)
     panels[-1, 0].set_xlabel("delay since the file's first sample (ms)")
     panels[-1, 1].set_xlabel("relative to the detected arrival (µs)")
     return figure

@@ -59,7 +59,8 @@ def _places(study: DesignStudy) -> Figure:
     before, after = study.before.scene, study.after.scene
     posture = study.after.posture
     figure = Figure(figsize=(WIDTH, 8.2), layout="constrained")
-    ax = figure.add_subplot(aspect="equal")
+    ax = figure.add_subplot()
+    ax.set_aspect("equal", adjustable="datalim")
     old, new = before.on_ground(posture), after.on_ground(posture)
     target = [i for i, p in enumerate(after.points) if p.role == "target"]
     interest = [after.row[name] for name in study.aim.interest]
@@ -107,8 +108,8 @@ def _places(study: DesignStudy) -> Figure:
                 ax.annotate(
                     after.points[k].name, tuple(new[k, :2]), (5, 5), textcoords="offset points", fontsize=7.5, color=INK
                 )
-    ax.set(xlabel="x, m (east)", ylabel="y, m (north)", title=f"{after.name}: places, {after.labels[posture]}")
-    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    ax.set(xlabel="x, east (m)", ylabel="y, north (m)", title=f"{after.name}: places, {after.labels[posture]}")
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside right upper")
     return figure
 
 
@@ -164,7 +165,7 @@ def _points(study: DesignStudy) -> Figure:
                 ax.errorbar(k, check.u / MILLIMETRE, check.u_u / MILLIMETRE, fmt="o", ms=3.5, color=INK, capsize=3)
             ax.plot([], [], "o", ms=3.5, color=INK, label="scatter of the worst, ± u")
     ax.set_ylim(0.0, 1.18 * max(float(first.max()), float(last.max())))
-    ax.set(ylabel="longest axis, mm", title=f"{study.after.scene.name}: points of interest")
+    ax.set(ylabel="longest axis (mm)", title=f"{study.after.scene.name}: points of interest")
     ax.legend(ncols=3, loc="upper right")
     return figure
 
@@ -178,7 +179,11 @@ def _numbers(study: DesignStudy) -> Figure:
     if study.settings.limit is not None:
         ax.axhline(study.settings.limit / MILLIMETRE, color=BAD, ls=":", lw=1.2, label="limit")
     ax.set_xticks(number)
-    ax.set(xlabel="number", ylabel="u, mm", title=f"{study.after.scene.name}: {quantity_of(study.aim)} against number")
+    ax.set(
+        xlabel="number of rangers or targets",
+        ylabel="u (mm)",
+        title=f"{study.after.scene.name}: {quantity_of(study.aim)} against number",
+    )
     ax.legend()
     return figure
 
@@ -211,7 +216,7 @@ def _map(study: DesignStudy, drawn: DesignMap) -> Figure:
     ax.set_ylim(drawn.y[0], drawn.y[-1])
     ax.grid(False)
     whose = drawn.ranger or "one more ranger"
-    ax.set(xlabel="x, m (east)", ylabel="y, m (north)", title=f"{scene.name}: u against the place of {whose}")
+    ax.set(xlabel="x, east (m)", ylabel="y, north (m)", title=f"{scene.name}: u against the place of {whose}")
     return figure
 
 
@@ -222,6 +227,6 @@ def _search(study: DesignStudy) -> Figure:
     for at, _ in study.path.starts[1:]:
         ax.axvline(at, color=FAINT, ls="--", lw=0.7)
     ax.set(
-        xlabel="accepted step", ylabel="u, mm", title=f"{study.after.scene.name}: {quantity_of(study.aim)}, searched"
+        xlabel="accepted step", ylabel="u (mm)", title=f"{study.after.scene.name}: {quantity_of(study.aim)}, searched"
     )
     return figure

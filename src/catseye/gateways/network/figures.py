@@ -326,7 +326,7 @@ def _residuals(adjusted: AdjustedNetwork) -> tuple[Figure, str]:
     t = np.linspace(-4.0, 4.0, 161)
     histogram.plot(t, len(w) * step * np.exp(-0.5 * t**2) / np.sqrt(2 * np.pi), color=INK, lw=1.2, label="normal")
     histogram.set_title("Against the normal distribution")
-    histogram.set_xlabel("test statistic; values beyond 4 in the last bins")
+    histogram.set_xlabel("test statistic w, clipped at ±4")
     histogram.set_ylabel("observations")
     histogram.legend(loc="upper left", handlelength=1.2)
     histogram.set_ylim(top=histogram.get_ylim()[1] * 1.25)

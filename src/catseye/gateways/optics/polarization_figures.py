@@ -25,6 +25,7 @@ AZIMUTHS = np.linspace(0.0, np.pi, 73)
 TILTS = np.radians(np.linspace(0.0, 20.0, 21))  # total reflection ends at 20.3 deg towards an edge
 OBLIQUE = np.radians(15.0)
 METALS = ("gold", "silver", "aluminium")
+LABELS = 1.42  # radii: labels of sectors, clear of the circle
 
 
 def corners(wavelength_um: float, glass: str) -> dict[str, Corner]:
@@ -106,11 +107,11 @@ def _draw_sectors(ax: Any, corner: Corner, glass: str) -> None:
         ax.annotate("", path[:, 8], path[:, 0], arrowprops={"arrowstyle": "->", "color": SERIES[0], "lw": 1.4})
         tilt, turning = ellipse(field)
         angles = f"{np.degrees(tilt):+.0f}°, {np.degrees(turning):+.0f}°"
-        ax.text(*(-1.22 * entry), angles, ha="center", va="center", fontsize=7.5, color=INK)
+        ax.text(*(-LABELS * entry), angles, ha="center", va="center", fontsize=7.5, color=INK)
     ax.annotate("", (0.16, 0.0), (-0.16, 0.0), arrowprops={"arrowstyle": "<->", "color": SERIES[1], "lw": 1.6})
-    ax.set_xlim(-1.6, 1.6)
-    ax.set_ylim(-1.4, 1.4)
-    ax.set_title(f"{glass}, bare, normal incidence\norange in, blue back: azimuth, ellipticity")
+    ax.set_xlim(-1.8, 1.8)
+    ax.set_ylim(-1.5, 1.5)
+    ax.set_title(f"{glass}, bare, normal incidence\norange in, blue back: azimuth, ellipticity", fontsize=9.0)
 
 
 def _sector_middle(order: tuple[int, ...]) -> NDArray[np.float64]:
@@ -130,7 +131,9 @@ def _draw_analyser(ax: Any, kinds: dict[str, Corner]) -> None:
     ax.set_ylim(-0.01, 1.1)
     ax.set_xlabel("azimuth of linear light from an edge (°)")
     ax.set_ylabel("share of the returned light")
-    ax.set_title(f"Through a crossed analyser\n{np.degrees(OBLIQUE):.0f}° towards an edge; dashed: normal incidence")
+    ax.set_title(
+        f"Through a crossed analyser\n{np.degrees(OBLIQUE):.0f}° towards an edge; dashed: normal", fontsize=9.0
+    )
     ax.legend(loc="upper right")
 
 
@@ -147,4 +150,4 @@ def _draw_axis(ax: Any, kinds: dict[str, Corner]) -> None:
     ax.set_ylim(0.0, 1.18)
     ax.set_xlabel("incidence, towards an edge (°)")
     ax.set_ylabel("relative to a perfect corner of that area")
-    ax.set_title("Far-field axis\nband: best to worst polarization")
+    ax.set_title("Far-field axis\nband: best to worst polarization", fontsize=9.0)

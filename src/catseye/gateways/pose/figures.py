@@ -84,7 +84,7 @@ def _terms(beam: PointingOffset) -> Figure:
             right = value >= 0.0
             bar = 2 * u if row == rows[-1] else 0.0
             ax.annotate(
-                f"{value:+.2f}",
+                f"{value:+.2f}" if abs(value) >= 0.005 else "0",
                 (value + (bar if right else -bar), row),
                 xytext=(4 if right else -4, 0),
                 textcoords="offset points",
@@ -93,6 +93,7 @@ def _terms(beam: PointingOffset) -> Figure:
                 fontsize=7.5,
             )
         ax.margins(x=0.22)
+        ax.grid(visible=False, axis="y")
         ax.set_title(title)
         ax.set_xlabel("offset of the beam (arcsec); bar of the sum: 2 u")
         ax.set_yticks(rows, names)

@@ -31,7 +31,7 @@ def motion_figure(fit: StructureFit) -> Figure:
             panel.plot(e / DEGREE, at.six[:, c] / scale + motion[:, c] / scale, "o", color=INK, markersize=2.6)
             panel.set_title(f"{'shift' if c < 3 else 'turn about'} {AXES[c % 3]}, {unit}")
             if c >= 3:
-                panel.set_xlabel("elevation, degrees")
+                panel.set_xlabel("elevation (°)")
         return figure
 
 
@@ -61,7 +61,7 @@ def residual_figure(fit: StructureFit, check: LeaveOut | None) -> Figure:
         below = figure.add_subplot(grid[1, :])
         if check is None:
             below.hist(residual[np.isfinite(residual)], bins=40, color=SERIES[0])
-            below.set_xlabel("residual, mm")
+            below.set_xlabel("residual (mm)")
         else:
             u = np.sqrt(np.einsum("tnii->tni", check.covariance))
             ratio = (check.residual / u)[np.isfinite(check.residual)]
@@ -94,10 +94,12 @@ def spectrum_figure(vibration: Vibration) -> Figure:
             label = f"{peak.likely_hz:.3g} Hz" + ("" if peak.decided else "?")
             panel.text(x, top * 30.0, label, rotation=90, ha="right", va="top", fontsize=8, color=INK)
         panel.set_ylim(top=top * 50.0)
-        panel.axvline(float(vibration.spectrum.nyquist_hz.min()), color=BAD, linewidth=0.9)
+        limit = float(vibration.spectrum.nyquist_hz.min())
+        panel.axvline(limit, color=BAD, linewidth=0.9)
+        panel.text(limit, top * 0.5, "Nyquist limit", rotation=90, ha="right", va="top", fontsize=8, color=BAD)
         panel.set_xlim(0.0, 1.02 * f[-1])
-        panel.set_xlabel("frequency, Hz")
-        panel.set_ylabel("density of the range, mm²/Hz")
+        panel.set_xlabel("frequency (Hz)")
+        panel.set_ylabel("density of the range (mm²/Hz)")
         if len(vibration.series) <= 12:
-            panel.legend(loc="upper right", ncols=2)
+            figure.legend(*panel.get_legend_handles_labels(), loc="outside lower center", ncols=4)
         return figure

@@ -104,7 +104,7 @@ def motion_figure(body: BodyTrend) -> Figure:
             panel.plot(x[order], model[order, c] / scale, color=INK)
             panel.set_title(f"{'shift' if c < 3 else 'turn about'} {'xyz'[c % 3]}, {unit}")
             if by_elevation and c >= 3:
-                panel.set_xlabel("elevation, degrees")
+                panel.set_xlabel("elevation (°)")
             elif not by_elevation:
                 _dated(panel)
         return figure

@@ -23,6 +23,8 @@ LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 CODES = {"code-cell": "python", "code-block": "", "code": "", "sourcecode": "", "literalinclude": ""}
 NOTES = ("note", "tip", "hint", "important", "warning", "caution", "attention", "danger", "error", "seealso")
 FIGURES = ("figure", "image", "command-figure")
+BUILT = "*(made by the build of the documentation"  # beginning of a line in place of what a terminal has not
+IN_PYTHON = "In Python: "
 OUTSIDE = ("http://", "https://", "mailto:")
 
 
@@ -49,6 +51,12 @@ def plain_markdown(text: str) -> str:
     """
     lines = _lines(FRONT.sub("", text).splitlines())
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)).strip("\n") + "\n"
+
+
+def has_prose(text: str) -> bool:
+    """Whether a page says anything that is not made by the build, headings aside."""
+    lines = plain_markdown(text).splitlines()
+    return any(line and not line.startswith(("#", BUILT, IN_PYTHON)) for line in lines)
 
 
 def linked_pages(text: str) -> list[str]:
@@ -110,9 +118,11 @@ def _rendered(directive: Directive) -> list[str]:
         if kind in kinds:
             return render(directive)
     if kind.startswith(("grid", "tab-", "card", "dropdown")) or kind in ("div", "container", "margin", "topic"):
-        title = [f"**{directive.argument}**", ""] if re.search(r"[A-Za-z]", directive.argument) else []
+        page = directive.options.get("link", "").removesuffix("/index")
+        there = f" (`catseye help {page}`)" if page and directive.options.get("link-type") == "doc" else ""
+        title = [f"**{directive.argument}**{there}", ""] if re.search(r"[A-Za-z]", directive.argument) else []
         return ["", *title, *_lines(directive.body), ""]
-    return ["", f"*(made by the build of the documentation: {f'{kind} {directive.argument}'.strip()})*", ""]
+    return ["", f"{BUILT}: {f'{kind} {directive.argument}'.strip()})*", ""]
 
 
 def _code(directive: Directive) -> list[str]:
@@ -122,6 +132,8 @@ def _code(directive: Directive) -> list[str]:
 
 def _command(directive: Directive) -> list[str]:
     """Command lines with their prompt; a line that a backslash continues has none."""
+    if "hide" in directive.options:
+        return []
     lines: list[str] = []
     for line in _trimmed(directive.body):
         lines.append(f"  {line}" if lines and lines[-1].endswith("\\") else f"$ {line}")
@@ -150,6 +162,33 @@ def _display(tex: str) -> list[str]:
     return ["", "```", *plain_formula(tex).splitlines(), "```", ""]
 
 
+def _written_file(directive: Directive) -> list[str]:
+    return ["", f"File `{directive.argument}`:", "", "```text", *_trimmed(directive.body), "```", ""]
+
+
+def _command_options(directive: Directive) -> list[str]:
+    return ["", f"Options: `catseye {directive.argument} --help`", ""]
+
+
+def _public(directive: Directive) -> list[str]:
+    names = " ".join([directive.argument, *directive.body]).split()
+    return ["", IN_PYTHON + ", ".join(f"`help(catseye.{name})`" for name in names), ""]
+
+
+def _module(directive: Directive) -> list[str]:
+    return ["", f"{IN_PYTHON}`help('{directive.argument}')`", ""]
+
+
+def _sources(directive: Directive) -> list[str]:
+    return ["", f"{IN_PYTHON}`from catseye.bibliography import SOURCES`", ""]
+
+
+def _gallery(directive: Directive) -> list[str]:
+    figures = [line.partition("=") for line in directive.body if "=" in line]
+    lines = [f"- {name.strip()}: {caption.strip()}" for name, _, caption in figures]
+    return ["", f"Figures of `{directive.options.get('command', directive.argument)}`:", "", *lines, ""]
+
+
 def _nothing(directive: Directive) -> list[str]:
     return []
 
@@ -160,6 +199,12 @@ RENDERED: dict[tuple[str, ...], Callable[[Directive], list[str]]] = {
     (*NOTES, "admonition"): _note,
     FIGURES: _figure,
     ("math",): _formula,
+    ("command-file",): _written_file,
+    ("command-reference",): _command_options,
+    ("public",): _public,
+    ("formulas",): _module,
+    ("references",): _sources,
+    ("gallery",): _gallery,
     ("toctree", "contents", "index", "raw"): _nothing,
 }
 

@@ -1,6 +1,7 @@
 """Pages of the documentation by name: find, list and read them."""
 
 import posixpath
+import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -8,9 +9,10 @@ from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.records.files.refusal import shown
-from catseye.records.topics.markup import linked_pages, page_title, plain_markdown
+from catseye.records.topics.markup import has_prose, linked_pages, page_title, plain_markdown
 
 NEAR = 3  # names that a refusal proposes
+INCLUDE = re.compile(r"(?ms)^```\{include\} +(\S+)\n.*?^```$")
 LIKENESS = 0.6  # of a proposed name, as difflib measures it
 
 
@@ -92,10 +94,23 @@ def topic_names() -> tuple[str, ...]:
     return tuple(sorted(map(topic_name, _files()), key=lambda name: ("/" in name, name)))
 
 
+def _source(page: Path) -> str:
+    """Text of a page with that of the files it includes; those are beside the pages in a wheel, too."""
+
+    def included(directive: re.Match[str]) -> str:
+        path = page.parent / directive[1]
+        return path.read_text(encoding="utf-8") if path.is_file() else directive[0]
+
+    return INCLUDE.sub(included, page.read_text(encoding="utf-8"))
+
+
 def topic_titles() -> dict[str, str]:
-    """Titles of all topics by name."""
-    files = {topic_name(page): path for page, path in _files().items()}
-    return {name: Topic(name, files[name].read_text(encoding="utf-8")).title for name in topic_names()}
+    """Titles of the topics by name, without pages that have no text before the documentation is built."""
+    files = _files()
+    pages = {topic_name(page): page for page in files}
+    topics = [Topic(name, _source(files[pages[name]])) for name in topic_names()]
+    folders = {name for name, page in pages.items() if page.endswith("/index")}
+    return {topic.name: topic.title for topic in topics if topic.name in folders or has_prose(topic.source)}
 
 
 def read_topic(name: str) -> Topic:
@@ -107,7 +122,7 @@ def read_topic(name: str) -> Topic:
     wanted = topic_name(name.strip("/").removeprefix("docs/").lower())
     full = [wanted] if wanted in files else [each for each in files if each.rpartition("/")[2] == wanted]
     if len(full) == 1:
-        return Topic(full[0], files[full[0]].read_text(encoding="utf-8"))
+        return Topic(full[0], _source(files[full[0]]))
     if full:
         raise InputError(f"topic {shown(name)} is not unique (expected {' or '.join(sorted(full))})")
     near = _near(wanted, sorted(files))

@@ -1,0 +1,9 @@
+// Names for a screen reader that the theme leaves out.
+document.addEventListener("DOMContentLoaded", () => {
+  for (const toggle of document.querySelectorAll(".toctree-toggle")) {
+    const link = toggle.closest("li")?.querySelector("a");
+    toggle.closest("summary")?.setAttribute("aria-label", `Pages of ${link?.textContent.trim() ?? "this part"}`);
+  }
+  // A signature on several lines is a list without terms.
+  for (const part of document.querySelectorAll("dt.sig dl, dt.sig dd")) part.setAttribute("role", "presentation");
+});

@@ -1,0 +1,122 @@
+"""Tables of docs/evidence/how-good.md from the measured data."""
+
+import re
+
+from repository import ROOT
+
+PAGE = ROOT / "docs" / "evidence" / "how-good.md"
+DATA = ROOT / "docs" / "evidence" / "how-good.json"
+TITLES = {
+    "ground": "ground rangers",
+    "arm": "feed arm",
+    "ball": "balls",
+    "triplet prism": "triplet prisms",
+    "dish": "dish prisms",
+    "struct": "structure",
+    "surface": "surface",
+    "pose": "pose",
+    "thermometers": "thermometers",
+}
+
+
+def table(head, rows):
+    """Markdown table."""
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows))
+
+
+def run_text(data):
+    """Sentence about the run."""
+    run = data["run"]
+    return (
+        f"Run of {run['date']} by catseye {run['version']} ({run['revision']}) on {run['processor']}, "
+        f"{run['cores']} cores, Python {run['python']}, numpy {run['numpy']}: {run['processor_s'] / 60:.1f} minutes of "
+        "processor time."
+    )
+
+
+def nights_text(data):
+    """Table of scatter by class, and of shots."""
+    nights = data["nights"]
+    counts = [n["seeds"][1] - n["seeds"][0] + 1 for n in nights]
+    head = ["", *(f"{n['prisms']} prisms, {k} nights" for n, k in zip(nights, counts, strict=True))]
+    rows = []
+    for kind, title in TITLES.items():
+        cells = []
+        for night in nights:
+            c = night["classes"][kind]
+            mean = f"{c['mean']:.2f}" if c["low"] < c["mean"] < c["high"] else f"**{c['mean']:.2f}**"
+            cells.append(f"{mean} ({c['low']:.2f} to {c['high']:.2f}); {c['mean'] ** -0.5:.2f}")
+        rows.append([title, *cells])
+    rows.append(["bad shots rejected with the right reason", *(f"{n['right']} of {n['bad']}" for n in nights)])
+    rows.append(["good shots rejected with them", *(f"{n['lost']} of {n['good']}" for n in nights)])
+    rows.append(["innocent thermometers named", *(str(n["innocent_thermometers_named"]) for n in nights)])
+    return table(head, rows)
+
+
+def records_text(data):
+    """Table of wrong records."""
+    head = ["wrong record", "named", "covered", "noticed", "silent", "mean square", "largest shift"]
+    rows = []
+    for r in data["wrong_records"]:
+        sizes = ["no result", ""]
+        if r["mean_square"] is not None:
+            sizes = [f"{r['mean_square']:.1f}", f"{1e3 * r['largest_shift_m']:.2f} mm"]
+        rows.append([r["record"], *(str(r[key]) for key in head[1:5]), *sizes])
+    nights = sum(data["wrong_records"][0][key] for key in head[1:5])
+    refused = sum(r["refused"] for r in data["wrong_records"])
+    return f"{table(head, rows)}\n\n{nights} nights of 60 prisms for each record; {refused} of them were refused."
+
+
+def networks_text(data):
+    """Tables of networks with known answers and with known variance factors."""
+    first = table(
+        ["network", "answer by", "points", "degrees of freedom", "largest difference", "in u", "of u itself"],
+        [
+            [
+                r["network"],
+                r["source"],
+                str(r["points"]),
+                str(r["degrees_of_freedom"]),
+                f"{1e6 * r['largest_difference_m']:.2g} µm",
+                f"{r['in_u']:.1g}",
+                f"{100 * r['largest_difference_of_u']:.1g} %",
+            ]
+            for r in data["networks"]
+        ],
+    )
+    second = table(
+        ["network", "variance factor, GNU Gama", "catseye"],
+        [[r["network"], f"{r['printed']:g}", f"{r['ours']:.4f}"] for r in data["variance_factors"]],
+    )
+    return f"{first}\n\n{second}"
+
+
+def baseline_text(data):
+    """Table of the baseline."""
+    b = data["baseline"]
+    rows = [
+        ["standard deviation of a distance", f"{1e3 * b['s_m']:.3f} mm, {b['degrees_of_freedom']} degrees of freedom",
+         f"{1e6 * b['s_difference_m']:.1f} µm"],
+        ["zero", f"{1e3 * b['zero_m']:.3f} ± {1e3 * b['u_zero_m']:.3f} mm", f"{1e6 * b['zero_difference_m']:.1f} µm"],
+        ["distances of the pillars", "", f"{1e6 * b['distance_difference_m']:.0f} µm at most"],
+    ]  # fmt: skip
+    return table([b["baseline"], "catseye", "beside plain least squares, all shots"], rows)
+
+
+TEXTS = {
+    "run": run_text,
+    "nights": nights_text,
+    "records": records_text,
+    "networks": networks_text,
+    "baseline": baseline_text,
+}
+
+
+def filled(page, data):
+    """Page with its tables made of the data, each between its two markers."""
+    for name, text in TEXTS.items():
+        marker = f"<!-- {name}: written by make evidence -->", f"<!-- end of {name} -->"
+        pattern = re.escape(marker[0]) + ".*?" + re.escape(marker[1])
+        page, count = re.subn(pattern, lambda _: f"{marker[0]}\n{text(data)}\n{marker[1]}", page, flags=re.DOTALL)  # noqa: B023
+        assert count == 1, f"{PAGE.name} has {count} places for {name}, expected 1"
+    return page
