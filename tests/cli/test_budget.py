@@ -41,7 +41,7 @@ def test_the_command_says_and_writes_the_call_s_numbers(catseye, tmp_path, budge
     np.testing.assert_allclose(found["points"]["ZY113"]["u"], budget.u[1], rtol=1e-12)
     np.testing.assert_allclose(found["points"]["DP012"]["contribution"], budget.contribution[:, 0], rtol=1e-12)
     written = {path.name for path in (tmp_path / "out").iterdir()}
-    assert written == {"budget.csv", "contributions.svg", "provenance.json", "result.json"}
+    assert written == {"budget.csv", "budget.json", "contributions.svg", "provenance.json"}
 
 
 def test_people_read_a_table_whose_columns_add_up(catseye):

@@ -43,6 +43,7 @@ class BudgetResult(Result):
     share: np.ndarray
     parts: "PointBudget"
     campaign: "Campaign"
+    air_model: str
 
     def passages(self) -> "Sequence[Passage]":
         """Sentence a point: its uncertainty, and the largest input of each axis."""
@@ -58,12 +59,9 @@ class BudgetResult(Result):
 
     def tables(self) -> "dict[str, QTable]":
         """`budget`: a row a point and kind of input."""
-        n, s = len(self.points), len(self.kinds)
-        columns = {"point": (np.repeat(self.points, s), ""), "input": (np.tile(self.kinds, n), "")}
-        for axis, name in enumerate(("x", "y", "z")):
-            columns[f"contribution_{name}"] = (1e6 * self.contribution[:, :, axis].T.ravel(), "um")
-            columns[f"share_{name}"] = (100.0 * self.share[:, :, axis].T.ravel(), "%")
-        return {"budget": quantities(columns)}
+        from catseye.gateways.epoch.budget import BUDGET
+
+        return {"budget": quantities(BUDGET.quantities(self.parts, [column.name for column in BUDGET.columns]))}
 
     def figures(self) -> "dict[str, Figure]":
         """Contributions of the inputs, by axis."""
@@ -76,6 +74,12 @@ class BudgetResult(Result):
         from catseye.gateways.epoch.budget import point_budget_lines
 
         return point_budget_lines(self.parts)
+
+    def write(self, directory: Path, progress: Progress | None = None) -> None:
+        """Write the files of `catseye budget --out`."""
+        from catseye.gateways.epoch.budget import write_budget
+
+        write_budget(self.parts, directory, self.campaign.hashes, settings={"air_model": self.air_model})
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of the campaign's files."""
@@ -122,4 +126,5 @@ def budget(
         share=parts.share,
         parts=parts,
         campaign=night,
+        air_model=air_model,
     )

@@ -1,16 +1,66 @@
-"""Budget of points as text, table lines, JSON and figure."""
+"""Budget of points as text, table lines, JSON, figure and files."""
 
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from catseye.gateways.epoch.explain import MICROMETRE, micrometres
-from catseye.gateways.writers.drawing import FAINT, SERIES, Figure, styled
+from catseye.gateways.writers.columns import Column, Table
+from catseye.gateways.writers.drawing import FAINT, SERIES, Figure, styled, svg
+from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.passage import Passage
+from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.reduction.budget.points import PointBudget
 
 AXES = ("east", "north", "up")
 SMALLEST = 0.01  # share of the variance of every axis below which an input is not listed
+FORMAT = "catseye-budget-1"
+
+
+def _of_axis(cells: Callable[[PointBudget], np.ndarray], axis: int) -> Callable[[PointBudget], np.ndarray]:
+    """Column of an axis: the inputs of the first point, of the second, ..."""
+    return lambda parts: cells(parts)[:, :, axis].T.ravel()
+
+
+def _contributions(parts: PointBudget) -> np.ndarray:
+    return parts.contribution / MICROMETRE
+
+
+def _shares(parts: PointBudget) -> np.ndarray:
+    return 100.0 * parts.share
+
+
+BUDGET = Table[PointBudget](
+    "budget.csv",
+    "results.md",
+    (
+        Column("point", "", "name", lambda parts: np.repeat(parts.points, len(parts.budget.sources))),
+        Column("input", "", "kind of input", lambda parts: np.tile(parts.budget.sources, len(parts.points))),
+        *(
+            column
+            for axis, name in enumerate("xyz")
+            for column in (
+                Column(
+                    f"contribution_{name}_um",
+                    "um",
+                    f"standard uncertainty of {name} that this input alone would leave",
+                    _of_axis(_contributions, axis),
+                    ".3f",
+                ),
+                Column(
+                    f"share_{name}_percent",
+                    "percent",
+                    f"its share of the variance of {name}",
+                    _of_axis(_shares, axis),
+                    ".3f",
+                ),
+            )
+        ),
+    ),
+)
 
 
 def listed(parts: PointBudget, point: int) -> list[int]:
@@ -100,3 +150,21 @@ def _bars(ax: Any, parts: PointBudget, n: int, rows: list[int]) -> None:
     ax.axhline(0.5, color=FAINT, lw=0.8)
     ax.grid(axis="y", visible=False)
     ax.set_title(parts.points[n], loc="left")
+
+
+def write_budget(
+    parts: PointBudget, directory: Path, inputs: Mapping[str, str], *, settings: Mapping[str, Any]
+) -> None:
+    """Write budget.csv, budget.json, contributions.svg, and last the provenance.
+
+    directory   existing, from `writers.output.atomic_directory`
+    inputs      SHA-256 of each input file, by name
+    settings    settings of the command
+    """
+    files: Files = {
+        BUDGET.file: lambda: BUDGET.csv(parts),
+        "budget.json": lambda: json_page({"format": FORMAT, **budget_object(parts)}),
+        "contributions.svg": lambda: svg(budget_figure(parts)),
+    }
+    made_by = {"format": FORMAT, "made_by": "catseye budget", "settings": dict(settings)}
+    write_files(files, directory, {**made_by, **origin(datetime.now(UTC), inputs)})
