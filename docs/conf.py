@@ -20,6 +20,7 @@ extensions = [
     "docstrings",
     "drawings",
     "gallery",
+    "glossary",
     "myst_nb",
     "python_reference",
     "references",

@@ -4,6 +4,8 @@ document.addEventListener("DOMContentLoaded", () => {
     const link = toggle.closest("li")?.querySelector("a");
     toggle.closest("summary")?.setAttribute("aria-label", `Pages of ${link?.textContent.trim() ?? "this part"}`);
   }
+  // A long formula scrolls by itself: the keyboard must reach it.
+  for (const formula of document.querySelectorAll("div.math")) formula.setAttribute("tabindex", "0");
   // A signature on several lines is a list without terms.
   for (const part of document.querySelectorAll("dt.sig dl, dt.sig dd")) part.setAttribute("role", "presentation");
 });

@@ -72,7 +72,9 @@ class Gallery(SphinxDirective):
 
         word = "".join(c if c.isalnum() else "-" for c in name)
         uri = self._file(f"figure-{self._number()}-{word}.svg", svg(figure))
-        image = nodes.image("", uri=uri, alt=f"{name}: {block.lines[name]}", loading="lazy")
+        image = nodes.image(
+            "", uri=uri, alt=f"{name}: {block.lines[name]}", width="100%"
+        )  # a width makes it a link to the figure
         caption = nodes.caption("", "", nodes.strong("", name.replace("_", " ")), nodes.Text(f": {block.lines[name]}"))
         made = nodes.figure("", image, caption, classes=["gallery-figure"])
         self.set_source_info(made)

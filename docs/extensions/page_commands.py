@@ -13,8 +13,21 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 WIDTH = 100  # columns of a terminal block
+PROGRAM = """# catseye without its progress, whose lines depend on the machine's speed
+import math
+
+from catseye.cli import terminal
+from catseye.cli.main import run
+
+if __name__ == "__main__":  # not where its processes load it again
+    terminal.FIRST_LINE = math.inf
+    run()
+"""
 LONGEST = 300.0  # s that one command may take
 ANSI = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)|[@-Z\\-_])")
+PROGRESS = re.compile(  # lines of a slow machine: "reducing nights 1 of 2, 10 s, some 10 s left", "adjusting 20"
+    r"(?m)^(?:[a-z][^\n:]* \d+(?: of \d+)?(?:, for [^\n]+|, [^\n]+ left)|adjusting \d+)(?:\n|$)"
+)
 FENCE = re.compile(r"^(?P<fence>`{3,}|:{3,})\{(?P<kind>command(?:-file|-figure)?)\}[ \t]*(?P<argument>.*)$")
 OPTION = re.compile(r"^:(?P<name>[a-z-]+):[ \t]*(?P<value>.*)$")
 
@@ -88,7 +101,9 @@ class PageDirectory:
         programs = self.path.parent / "bin"
         programs.mkdir()
         python = shlex.quote(sys.executable)
-        for name, line in (("catseye", f'{python} -m catseye "$@"'), ("python", f'{python} "$@"')):
+        (self.path.parent / "catseye.py").write_text(PROGRAM, encoding="utf-8")
+        program = shlex.quote(str(self.path.parent / "catseye.py"))
+        for name, line in (("catseye", f'{python} -P {program} "$@"'), ("python", f'{python} "$@"')):
             (programs / name).write_text(f"#!/bin/sh\nexec {line}\n", encoding="utf-8")
             (programs / name).chmod(0o755)
 
@@ -145,9 +160,9 @@ class PageDirectory:
         return {**os.environ, **terminal, "PATH": path, "PYTHONPATH": search, "OPENBLAS_NUM_THREADS": "1"}
 
     def _shown(self, printed: str) -> str:
-        """Printed text as a page shows it: no colours, no overwritten lines, no path of this machine."""
+        """Printed text as a page shows it: no colours, no progress, no overwritten lines, no path of this machine."""
         plain = ANSI.sub("", printed).replace("\r\n", "\n")
         plain = "\n".join(line.rsplit("\r", 1)[-1].rstrip() for line in plain.split("\n"))
         for place in (self.path.resolve(), self.path):
             plain = plain.replace(f"{place}/", "").replace(str(place), ".")
-        return plain.strip("\n")
+        return PROGRESS.sub("", plain).strip("\n")

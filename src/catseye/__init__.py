@@ -16,6 +16,8 @@ from catseye.version import __version__
 if TYPE_CHECKING:
     from catseye.api.air_paths import acoustic, refractometer
     from catseye.api.baseline import baseline
+    from catseye.api.budget.points import budget
+    from catseye.api.budget.shot import explain
     from catseye.api.exploring import report_of
     from catseye.api.figures import (
         plot_aberration,
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     from catseye.api.laboratory import calibrate, certificate, save_triplet_form, triplet
     from catseye.api.living import replay, simulate
     from catseye.api.network import adjust, compare
-    from catseye.api.night import explain, night, reduce
+    from catseye.api.night import night, reduce
     from catseye.api.optics import beam, glass, link, safety
     from catseye.api.panels import panels
     from catseye.api.planning import plan
@@ -55,6 +57,8 @@ if TYPE_CHECKING:
 FACE = {  # file of catseye.api -> its exported names
     "air_paths": ("acoustic", "refractometer"),
     "baseline": ("baseline",),
+    "budget.points": ("budget",),
+    "budget.shot": ("explain",),
     "exploring": ("report_of",),
     "figures": (
         "plot_aberration",
@@ -70,7 +74,7 @@ FACE = {  # file of catseye.api -> its exported names
     "laboratory": ("calibrate", "certificate", "save_triplet_form", "triplet"),
     "living": ("replay", "simulate"),
     "network": ("adjust", "compare"),
-    "night": ("explain", "night", "reduce"),
+    "night": ("night", "reduce"),
     "optics": ("beam", "glass", "link", "safety"),
     "panels": ("panels",),
     "planning": ("plan",),
@@ -109,6 +113,7 @@ __all__ = [
     "backup_journal",
     "baseline",
     "beam",
+    "budget",
     "calibrate",
     "certificate",
     "check_journal",

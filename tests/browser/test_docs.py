@@ -11,7 +11,7 @@ import pytest
 from browser.scene import AXE, wait_for
 
 BUILT = Path(os.environ.get("CATSEYE_DOCS", "not-built"))  # the site, of `make docs`
-FORMULAS = ("why/formulas.html", "conventions.html")  # the first that has some is opened
+FORMULAS = ("why/how-it-works.html", "why/budget.html", "conventions.html")  # the first that has some is opened
 READ = (
     *("index.html", "reference/python/night.html", "reference/python/formulas/atmosphere-weather.html"),
     *("formats/results.html", "references.html", "glossary.html"),

@@ -84,8 +84,8 @@ def test_bash_completes(bash, words, expected):
 
 
 def test_bash_completes_examples_of_networks_beside_files(bash):
-    found = bash("adjust", "net")
-    assert {"network.toml", "networks/feed-arm.toml", "networks/ground-ring"} <= set(found)
+    completions = bash("adjust", "net")
+    assert {"network.toml", "networks/feed-arm.toml", "networks/ground-ring"} <= set(completions)
 
 
 def test_bash_completes_every_kind_of_calibration_and_of_figure(bash):
@@ -127,15 +127,15 @@ def callbacks():
 
 def test_every_path_that_is_read_has_examples_or_is_known_to_have_none():
     reading = {(command, name) for command, callback in callbacks() for name in paths_of(callback)}
-    known = WRITTEN | WITHOUT_EXAMPLES | set(EXAMPLES)
-    assert [(command, name) for command, name in reading if not {name, f"{command} {name}"} & known] == []
+    listed = WRITTEN | WITHOUT_EXAMPLES | set(EXAMPLES)
+    assert [(command, name) for command, name in reading if not {name, f"{command} {name}"} & listed] == []
 
 
 @pytest.mark.parametrize("key", sorted(EXAMPLES))
 def test_every_pattern_has_an_example(key):
-    own = ["gbt", *examples()]
+    bundled = ["gbt", *examples()]
     kind = {"calibrate": "encoder", "certificate": "mirror"}.get(key.split()[0], "")
-    assert all(any(fnmatch(name, pattern.format(kind=kind)) for name in own) for pattern in EXAMPLES[key])
+    assert all(any(fnmatch(name, pattern.format(kind=kind)) for name in bundled) for pattern in EXAMPLES[key])
 
 
 def test_an_argument_that_is_missing_matches_anything():

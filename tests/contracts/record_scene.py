@@ -63,10 +63,10 @@ class Key:
 def record_named(path: str) -> type[Record]:
     """Record of a path in the package, such as `records.site.monument.MonumentGeometry`."""
     module, _, name = path.rpartition(".")
-    found = getattr(import_module(f"catseye.{module}"), name, None)
-    if not (inspect.isclass(found) and issubclass(found, Record)):
+    record = getattr(import_module(f"catseye.{module}"), name, None)
+    if not (inspect.isclass(record) and issubclass(record, Record)):
         raise ValueError(f"catseye.{path} is not a record")
-    return found
+    return record
 
 
 def own_fields(record: type[Record]) -> list[str]:
@@ -97,8 +97,10 @@ def _key(record: type[Record], name: str, described: dict[str, str]) -> Key:
     if not meaning and name.startswith("u_") and name[2:] in described:
         meaning = f"standard uncertainty of `{name[2:]}`"
     elif meaning and name.startswith("u_"):
-        if meaning == described.get(name[2:]):
-            meaning = f"standard uncertainty of `{name[2:]}`"
+        partners = [key for key, text in described.items() if text == meaning and not key.startswith("u_")]
+        if partners:
+            keys = [name[2:]] if name[2:] in partners else partners
+            meaning = f"standard uncertainty of {' and '.join(f'`{key}`' for key in keys)}"
         elif not re.search("uncertaint|scatter|repeatab|resolution|drift", meaning):
             meaning = f"standard uncertainty{'' if meaning.startswith('of ') else ':'} {meaning}"
     return Key(name, _value(name, field), _default(field), meaning)
@@ -106,7 +108,7 @@ def _key(record: type[Record], name: str, described: dict[str, str]) -> Key:
 
 def meanings(record: type) -> dict[str, str]:
     """Text of each key in the aligned block of a docstring, as Markdown."""
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for paragraph in paragraphs(inspect.cleandoc(record.__doc__ or "").splitlines()[1:]):
         for start in range(len(paragraph)):
             try:
@@ -114,9 +116,9 @@ def meanings(record: type) -> dict[str, str]:
             except IndexError:  # prose before the block
                 continue
             for key, text in pairs:
-                found |= {name: marked(text, record) for name in split_names(key) if name not in found}
+                texts |= {name: marked(text, record) for name in split_names(key) if name not in texts}
             break
-    return found
+    return texts
 
 
 def marked(text: str, record: type) -> str:
@@ -129,7 +131,7 @@ def marked(text: str, record: type) -> str:
 
 
 def _plain(text: str, record: type) -> str:
-    known = getattr(record, "model_fields", {})
+    fields = getattr(record, "model_fields", {})
     text = re.sub(r"\b([xyz])\^(?!\d)", lambda match: match[1] + "\u0302", text)
     text = text.replace("^2", "²").replace("1/e²", "1/e²")
     text = re.sub(r"\b(Theta|Phi|psi)\b", lambda match: GREEK[match[1]], text)
@@ -137,7 +139,7 @@ def _plain(text: str, record: type) -> str:
     text = re.sub(r"(?<![\w-])-(?=\d)", "−", text)
     words = re.split(r"(\b[a-z]\w*_\w+\b)", text)
     return "".join(
-        f"`{word}`" if k % 2 and (word in known or "_" in word) else re.sub(r"([*<>$|\[\]])", r"\\\1", word)
+        f"`{word}`" if k % 2 and (word in fields or "_" in word) else re.sub(r"([*<>$|\[\]])", r"\\\1", word)
         for k, word in enumerate(words)
     )
 

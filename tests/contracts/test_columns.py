@@ -143,6 +143,7 @@ PANELS = EXAMPLES / "panels"
 ACOUSTIC = EXAMPLES / "acoustic"
 COMMANDS = {  # directory -> the command that writes it; night: of the one before
     "night": ["reduce", EXAMPLES / "night-01"],
+    "budget": ["budget", EXAMPLES / "night-01", "DP012"],
     "network": ["adjust", NETWORK],
     "epochs": ["adjust", NETWORK, NETWORK],
     "plan": ["plan", NETWORK, "--budget-s", 600, "--shot-s", 5],

@@ -77,6 +77,8 @@ def members_of(node: ast.AST) -> set[str]:
 @cache
 def dotted_is_there(name: str) -> bool:
     """Whether a dotted name, from `catseye` or from a room, leads to a module, to its attribute, or to a member."""
+    if f"src/catseye/{name.replace('.', '/')}.py" in added():
+        return True
     here, parts = PACKAGE, name.removeprefix("catseye.").split(".")
     while parts and (here / parts[0] / "__init__.py").is_file():
         here, parts = here / parts[0], parts[1:]

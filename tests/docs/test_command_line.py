@@ -103,6 +103,15 @@ def test_blocks_of_a_page_are_those_that_the_build_runs():
     assert [text.splitlines()[b.line - 1][:10] for b in blocks] == ["```{comman"] * 6
 
 
+def test_progress_of_a_slow_machine_is_not_shown():
+    directory = PageDirectory()
+    text = r"adjusting 20\nplan runs 50 of 100, for 2 s\nnights 1 of 2, 10 s, some 10 s left\nline 3 of 4: bad\nrows 12"
+    try:
+        assert directory.run(f"printf '{text}'").output == "line 3 of 4: bad\nrows 12"
+    finally:
+        directory.close()
+
+
 def test_a_command_that_hangs_is_stopped():
     directory = PageDirectory()
     outcome = directory.run("echo begun; sleep 60", longest_s=0.3)

@@ -1,6 +1,7 @@
 """Gallery of figures: it shows every figure that the package can draw, and each block makes what it names."""
 
 import ast
+import re
 import sys
 
 import pytest
@@ -102,6 +103,7 @@ def test_a_page_shows_figures_with_their_lines_and_the_report(tmp_path):
     assert warnings == ""
     html = (tmp_path / "html" / "index.html").read_text(encoding="utf-8")
     assert 'alt="TR01: A unit"' in html
+    assert re.search(r'<a [^>]*href="_images/[^"]+\.svg"[^>]*><img', html)
     assert "$ catseye triplet TR01" in html
     assert len(list((tmp_path / "html" / "_images").glob("*.svg"))) == 1
     assert app.statuscode == 0

@@ -29,7 +29,8 @@ def run_text(data):
     run = data["run"]
     return (
         f"Run of {run['date']} by catseye {run['version']} ({run['revision']}) on {run['processor']}, "
-        f"{run['cores']} cores, Python {run['python']}, numpy {run['numpy']}: {run['processor_s'] / 60:.1f} minutes of processor time."
+        f"{run['cores']} cores, Python {run['python']}, numpy {run['numpy']}: {run['processor_s'] / 60:.1f} minutes of "
+        "processor time."
     )
 
 

@@ -272,15 +272,15 @@ def _refuse_mixtures(
             raise ArgumentError("pointing needs the dish in the frame reflector", "pointing")
 
 
-def _refuse_without_site(*, earlier: bool, **given: Any) -> None:
+def _refuse_without_site(*, earlier: bool, **arguments: Any) -> None:
     """Raise ArgumentError for arguments that need a site's records.
 
-    earlier   True where no earlier epoch is given
-    given     the others; None where they are not given
+    earlier     True where no earlier epoch is given
+    arguments   the others; None where they are not given
     """
     if earlier:
         raise ArgumentError("earlier or site is needed: the epoch to count from, or the design", "earlier", "site")
-    for name, value in given.items():
+    for name, value in arguments.items():
         if value is not None:
             raise ArgumentError(f"{name} needs site: the records of a telescope", name, "site")
 

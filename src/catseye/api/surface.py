@@ -255,13 +255,18 @@ def surface(
     _refuse_values(taper_db=taper_db, frequency_ghz=frequency_ghz, zernike=zernike, elevation_deg=elevation_deg)
     _refuse_values(azimuth_deg=() if azimuth_deg is None else azimuth_deg)
     _refuse_words(free=free, order=[order], frame=[frame], travel=[travel])
-    given = {"focal_length_m": focal_length_m, "radius_m": radius_m, "diameter_m": diameter_m, "u_mm": u_mm}
-    _refuse_values(**{name: value for name, value in given.items() if value is not None})
-    dish = _dish(site, given, centre=centre, vertex=vertex, axis=axis)
+    sizes = {"focal_length_m": focal_length_m, "radius_m": radius_m, "diameter_m": diameter_m, "u_mm": u_mm}
+    _refuse_values(**{name: value for name, value in sizes.items() if value is not None})
+    dish = _dish(site, sizes, centre=centre, vertex=vertex, axis=axis)
     if dish.site is None:
         _refuse_of_site(frame=frame != "reflector", azimuth_deg=azimuth_deg is not None, actuators=actuators)
     placed = _Placed(
-        dish, frame, azimuth_deg, _row(elevation_deg), _row(temperature_c), None if u_mm is None else u_mm * MILLIMETRE
+        dish=dish,
+        frame=frame,
+        azimuth_deg=azimuth_deg,
+        elevation_deg=_row(elevation_deg),
+        temperature_c=_row(temperature_c),
+        u=None if u_mm is None else u_mm * MILLIMETRE,
     )
     if points is None:
         prisms, hashes, sources = _of_inputs(inputs, placed)
@@ -288,7 +293,7 @@ def _row(values: float | Sequence[float]) -> tuple[float, ...]:
 
 def _dish(
     site: "str | os.PathLike[str] | SiteFolder | None",
-    given: dict[str, Any],
+    sizes: dict[str, Any],
     *,
     centre: Sequence[float],
     vertex: Sequence[float],
@@ -296,21 +301,21 @@ def _dish(
 ) -> "DishDesign":
     """Design: of a site's records, or of a focal length with a size.
 
-    given   focal_length_m, radius_m and diameter_m; None where they are not given
+    sizes   focal_length_m, radius_m and diameter_m; None where they are not given
 
     Raises ArgumentError for arguments that do not fit together.
     """
     from catseye.records.site.folder import SiteFolder, read_site
     from catseye.reduction.surface.dish import DishDesign
 
-    focal_length, radius, diameter = given["focal_length_m"], given["radius_m"], given["diameter_m"]
+    focal_length, radius, diameter = sizes["focal_length_m"], sizes["radius_m"], sizes["diameter_m"]
     rows = {"centre": (centre, 2), "vertex": (vertex, 3), "axis": (axis, 3)}
     numbers = {name: np.array(_row(value)) for name, (value, _) in rows.items()}
     if focal_length is None:
-        moved = {"radius_m": radius is not None, "diameter_m": diameter is not None}
-        moved |= {name: bool(np.any(numbers[name] != (0.0, 0.0, 1.0)[-rows[name][1] :])) for name in ("axis",)}
-        moved |= {name: bool(np.any(numbers[name])) for name in ("centre", "vertex")}
-        for name, is_given in moved.items():
+        placements = {"radius_m": radius is not None, "diameter_m": diameter is not None}
+        placements |= {name: bool(np.any(numbers[name] != (0.0, 0.0, 1.0)[-rows[name][1] :])) for name in ("axis",)}
+        placements |= {name: bool(np.any(numbers[name])) for name in ("centre", "vertex")}
+        for name, is_given in placements.items():
             if is_given:
                 raise ArgumentError(f"{name} needs focal_length_m, too: a dish without a site", name, "focal_length_m")
         return DishDesign.of_site(site if isinstance(site, SiteFolder) else read_site(place_of(site or "gbt")))
@@ -329,9 +334,9 @@ def _dish(
     )  # fmt: skip
 
 
-def _refuse_of_site(**given: bool) -> None:
+def _refuse_of_site(**arguments: bool) -> None:
     """Raise ArgumentError for arguments that need a site's records."""
-    for name, is_given in given.items():
+    for name, is_given in arguments.items():
         if is_given:
             raise ArgumentError(f"{name} needs the records of a site, not focal_length_m", name, "focal_length_m")
 

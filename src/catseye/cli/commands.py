@@ -28,7 +28,7 @@ ROOMS = (
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples", "help"),
-    "A night of ranges": ("reduce", "explain", "night"),
+    "A night of ranges": ("reduce", "explain", "budget", "night"),
     "Networks": ("adjust", "plan", "design", "baseline"),
     "The telescope": ("pose", "surface", "pointing", "structure", "panels"),
     "Laboratory": ("calibrate", "certificate", "triplet"),

@@ -87,8 +87,8 @@ def names(patterns: tuple[str, ...], words: dict[str, str], incomplete: str) -> 
     from catseye.api.reading import examples
 
     filled = [re.sub(r"\{(\w+)\}", lambda match: words.get(match[1]) or "*", pattern) for pattern in patterns]
-    own = ["gbt", *examples()]  # short for sites/gbt
-    fitting = [name for name in own if name.startswith(incomplete) and any(fnmatch(name, each) for each in filled)]
+    bundled = ["gbt", *examples()]  # short for sites/gbt
+    fitting = [name for name in bundled if name.startswith(incomplete) and any(fnmatch(name, each) for each in filled)]
     if not fitting:
         return []
     files = set(_files(incomplete))

@@ -1,4 +1,4 @@
-"""The command of one range: explain."""
+"""The commands of uncertainty by input: explain a shot, budget of points."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,7 @@ from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
 from catseye.cli.vocabularies import AIR_MODEL
 
-FEWEST, MOST = 1000, 10_000_000  # draws, as in catseye.api.night
+FEWEST, MOST = 1000, 10_000_000  # draws, as in catseye.api.budget.shot
 
 
 def _draws(value: int) -> int:
@@ -38,8 +38,8 @@ def explain(  # noqa: PLR0913 - its options are its command line
     strict: Strict = False,
 ) -> None:
     """The range of one shot and every cause of its uncertainty, before any adjustment."""
-    from catseye.api.night import explain as explained
-    from catseye.api.night import require_page
+    from catseye.api.budget.shot import explain as explained
+    from catseye.api.budget.shot import require_page
 
     require_page(page)
     progress = ProgressLine(quiet)
@@ -52,3 +52,35 @@ def explain(  # noqa: PLR0913 - its options are its command line
     lines = result.lines()
     rows = [*(["", *lines] if lines else []), *([] if page is None else [""])]
     tell(result, json=json, quiet=quiet, strict=strict, rows=rows, written=[("Written to", page)])
+
+
+@app.command(epilog="\b\nExample: catseye budget examples/night-01 DP012 ZY113 --out budget")
+def budget(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="Directory of a campaign, laid out as examples/night-01.")
+    ],
+    points: Annotated[
+        list[str], typer.Argument(metavar="POINT ...", help="Points of the night: targets, or scan points of rangers.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
+    ] = None,
+    air_model: AirModel = AIR_MODEL,
+    json: Json = False,
+    quiet: Quiet = False,
+    strict: Strict = False,
+) -> None:
+    """Uncertainty of a night's coordinates by kind of input, after the adjustment."""
+    from catseye.api.budget.points import budget as budget_of
+    from catseye.api.result import require_writable, save
+
+    require_writable(out, campaign)
+    progress = ProgressLine(quiet)
+    try:
+        result = budget_of(campaign, points, air_model=air_model, progress=progress)
+        if out is not None:
+            save(result, out)
+    finally:
+        progress.clear()
+    tell(result, json=json, quiet=quiet, strict=strict, rows=["", *result.rows()], written=[("Written to", out)])

@@ -43,7 +43,7 @@ def _header(reduction: Reduction) -> dict[str, str | int | float]:
     """Keywords of the primary header."""
     coordinates, campaign = reduction.coordinates, reduction.campaign
     first, last = (float(f(campaign.shots.mjd_utc)) for f in (np.min, np.max))
-    held = matrix_file(coordinates.points) == COVARIANCE
+    separate = matrix_file(coordinates.points) == COVARIANCE
     factor = coordinates.variance_factor
     return {
         "CAMPAIGN": ascii_text(campaign.site.campaign.name),
@@ -57,7 +57,7 @@ def _header(reduction: Reduction) -> dict[str, str | int | float]:
         "WHY": ascii_text(reduction.verdict.why),
         **({"VARFACT": factor} if np.isfinite(factor) else {}),
         "DOF": int(coordinates.degrees_of_freedom),
-        **({"COVFILE": COVARIANCE} if held else {}),
+        **({"COVFILE": COVARIANCE} if separate else {}),
     }
 
 
@@ -140,8 +140,8 @@ def _covariance(reduction: Reduction) -> list[SamplerTable]:
 
 def _provenance(reduction: Reduction) -> SamplerTable:
     """Inputs with SHA-256, versions and settings, as in provenance.json."""
-    known = {"input": reduction.campaign.hashes, "version": versions(), "setting": asdict(reduction.settings)}
-    rows = [(kind, name, str(value)) for kind, values in known.items() for name, value in values.items()]
+    origins = {"input": reduction.campaign.hashes, "version": versions(), "setting": asdict(reduction.settings)}
+    rows = [(kind, name, str(value)) for kind, values in origins.items() for name, value in values.items()]
     columns = {
         title: SamplerColumn("", np.array([ascii_text(row[k]) for row in rows], dtype=str))
         for k, title in enumerate(("KIND", "NAME", "VALUE"))

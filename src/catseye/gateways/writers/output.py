@@ -27,6 +27,7 @@ FORMATS = (
     "catseye-beam-1",
     "catseye-journal-export-1",
     "catseye-surface-1",
+    "catseye-budget-1",
     "catseye-pose-1",
     "catseye-pointing-1",
     "catseye-track-profile-1",

@@ -58,9 +58,9 @@ def read_point_table(text: str, file: str, *, kind: str | None = None, u: float 
     ([[1.5, 0.0, 0.02]], [9e-10, 9e-10, 9e-10])
     """
     columns = _lower_case(text, file)
-    known = _known(columns)
-    coordinates = np.column_stack([_scaled(columns, *known[axis]) for axis in AXES])
-    covariance = _covariance(columns, known)
+    headings = _headings(columns)
+    coordinates = np.column_stack([_scaled(columns, *headings[axis]) for axis in AXES])
+    covariance = _covariance(columns, headings)
     names = _names(columns)
     rows = np.arange(len(names))
     if kind is not None and "kind" in columns.cells:
@@ -87,19 +87,20 @@ def _lower_case(text: str, file: str) -> TextColumns:
     return columns_of(header + line + body, file, (), optional=titles)
 
 
-def _known(columns: TextColumns) -> dict[str, tuple[str, float]]:
+def _headings(columns: TextColumns) -> dict[str, tuple[str, float]]:
     """Column and factor to metres of each quantity; a missing axis or two columns of one quantity are refused."""
-    known: dict[str, tuple[str, float]] = {}
+    headings: dict[str, tuple[str, float]] = {}
     for title in columns.cells:
         for name in (*AXES, "u", *SPREADS, *PAIRS):
             unit = title.removeprefix(name)
             unit = unit.removesuffix("2") if name in PAIRS else unit
             if title.startswith(name) and unit in UNITS:
-                if name in known:
+                if name in headings:
                     raise refusal(
-                        columns.file, f"line 1, columns {known[name][0]!r} and {title!r} are both {name} (expected one)"
+                        columns.file,
+                        f"line 1, columns {headings[name][0]!r} and {title!r} are both {name} (expected one)",
                     )
-                known[name] = title, UNITS[unit] ** (2 if name in PAIRS else 1)
+                headings[name] = title, UNITS[unit] ** (2 if name in PAIRS else 1)
                 break
         else:
             if DOUBTFUL.fullmatch(title):
@@ -107,10 +108,10 @@ def _known(columns: TextColumns) -> dict[str, tuple[str, float]]:
                     columns.file, f"line 1, column {shown(title)} looks like an uncertainty (expected {HEADER})"
                 )
     for axis in AXES:
-        if axis not in known:
+        if axis not in headings:
             titles = ", ".join(columns.cells)
             raise refusal(columns.file, f"line 1, no column of {axis} among {titles} (expected {HEADER})")
-    return known
+    return headings
 
 
 def _scaled(columns: TextColumns, title: str, factor: float) -> np.ndarray:
@@ -135,26 +136,28 @@ def _names(columns: TextColumns) -> list[str]:
     return names
 
 
-def _covariance(columns: TextColumns, known: dict[str, tuple[str, float]]) -> np.ndarray | None:
+def _covariance(columns: TextColumns, headings: dict[str, tuple[str, float]]) -> np.ndarray | None:
     """Covariance of each point, (n, 3, 3) m²; None without columns of u."""
-    own = [name for name in SPREADS if name in known]
-    pairs = [name for name in PAIRS if name in known]
-    if not own and "u" not in known:
+    spreads = [name for name in SPREADS if name in headings]
+    pairs = [name for name in PAIRS if name in headings]
+    if not spreads and "u" not in headings:
         if pairs:
-            raise refusal(columns.file, f"line 1, {known[pairs[0]][0]!r} without u_x, u_y and u_z (expected {HEADER})")
+            raise refusal(
+                columns.file, f"line 1, {headings[pairs[0]][0]!r} without u_x, u_y and u_z (expected {HEADER})"
+            )
         return None
-    if own and len(own) < 3:
-        missing = next(name for name in SPREADS if name not in known)
-        raise refusal(columns.file, f"line 1, {known[own[0]][0]!r} without {missing} (expected all three)")
-    titles = [known[name] for name in (own or ("u",) * 3)]
+    if spreads and len(spreads) < 3:
+        missing = next(name for name in SPREADS if name not in headings)
+        raise refusal(columns.file, f"line 1, {headings[spreads[0]][0]!r} without {missing} (expected all three)")
+    titles = [headings[name] for name in (spreads or ("u",) * 3)]
     u = np.column_stack([_u(columns, *title) for title in titles])
     covariance = np.asarray(u[:, :, None] * np.eye(3) * u[:, None, :])
     for name in pairs:
         i, j = PAIRS[name]
-        covariance[:, i, j] = covariance[:, j, i] = _scaled(columns, *known[name])
+        covariance[:, i, j] = covariance[:, j, i] = _scaled(columns, *headings[name])
     if pairs:
         smallest = np.linalg.eigvalsh(covariance)[:, 0]
-        columns.check(known[pairs[0]][0], smallest > 0.0, "a covariance smaller than the product of both u")
+        columns.check(headings[pairs[0]][0], smallest > 0.0, "a covariance smaller than the product of both u")
     return covariance
 
 

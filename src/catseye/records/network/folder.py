@@ -164,8 +164,8 @@ def _distances(
     if without.any():
         if not claim:
             row = int(np.argmax(without))
-            how = "sigma_mm and sigma_ppm (--sigma-mm, --sigma-ppm) for ranges without"
-            raise ranges.refuse(row, f"no sigma (expected one, m, or {how})")
+            options = "sigma_mm and sigma_ppm (--sigma-mm, --sigma-ppm) for ranges without"
+            raise ranges.refuse(row, f"no sigma (expected one, m, or {options})")
         sigma = np.where(without, claim.of(np.where(np.isnan(distance), 1.0, distance)), sigma)  # of a plan: there
     if "sigma" in ranges.cells:
         ranges.check("sigma", sigma > 0.0, "above 0 m: no measurement is exact")

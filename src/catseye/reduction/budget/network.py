@@ -139,9 +139,9 @@ def _of_shots(network: CampaignNetwork, group: ObservationGroup, part: ShotParts
         walk = per_radian**2 * network.states[part.name].own
     else:
         walk = per_radian**2 * part.electronics.covariance
-    own = noise + eddies
-    rest = group.covariance - (own + walk if walk.ndim == 1 else np.diag(own) + walk)
-    yield from ((NOISE, noise), (EDDIES, eddies), (WALK, walk), (FLUCTUATION, rest))
+    independent = noise + eddies
+    air = group.covariance - (independent + walk if walk.ndim == 1 else np.diag(independent) + walk)
+    yield from ((NOISE, noise), (EDDIES, eddies), (WALK, walk), (FLUCTUATION, air))
 
 
 def _quadratic(covariance: np.ndarray, gain: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ def pose_of_points(
     first, second = earlier.places(names), later.places(names)
     _refuse_units(later, earlier, first, second)
     frame = GROUND if later.posture is not None and earlier.posture is not None else TABLE
-    covariance = PlaceCovariances(first=_known(earlier, names), second=_known(later, names))
+    covariance = PlaceCovariances(first=_covariance_of(earlier, names), second=_covariance_of(later, names))
     if covariance.first is None and covariance.second is None:
         raise InputError(
             f"{later.file} and {earlier.file}: neither has uncertainties (expected a column u_mm in one of them, or "
@@ -84,7 +84,7 @@ def _common(
     return names, tuple(missing)
 
 
-def _known(epoch: SolvedPoints, names: Sequence[str]) -> Known | None:
+def _covariance_of(epoch: SolvedPoints, names: Sequence[str]) -> Known | None:
     """Covariance of some points: of all together or of each; None where they are exact."""
     rows = epoch.rows(names)
     if isinstance(epoch.covariance, JointPoints):
@@ -114,13 +114,13 @@ def _exchanged(later: SolvedPoints, first: np.ndarray, second: np.ndarray, fitte
         changed = second[:, order]
         matrix, mirrored = closed_form(first, changed)
         centred = changed - changed.mean(axis=0) - (first - first.mean(axis=0)) @ matrix.T
-        left = float(np.sqrt(np.mean(centred**2)))
+        unexplained = float(np.sqrt(np.mean(centred**2)))
         angle = float(np.arccos(np.clip(0.5 * (np.trace(matrix) - 1.0), -1.0, 1.0)))
-        explains = left < SMALL * misfit or (angle < SMALL * turn and left < 2.0 * misfit)
+        explains = unexplained < SMALL * misfit or (angle < SMALL * turn and unexplained < 2.0 * misfit)
         if not mirrored and angle < SMALL * TURNED and explains:
-            moved = [AXES[k] for k in range(3) if order[k] != k]
+            changed_axes = [AXES[k] for k in range(3) if order[k] != k]
             axes = ", ".join(AXES[k] for k in order)
-            text = f"{' and '.join(moved)} exchanged" if len(moved) == 2 else f"axes in the order {axes}"
+            text = f"{' and '.join(changed_axes)} exchanged" if len(changed_axes) == 2 else f"axes in the order {axes}"
             return f"turned by {turn / DEGREE:.0f}°; with {text} in {later.file} by {angle / DEGREE:.2f}°"
     return ""
 
@@ -133,16 +133,16 @@ def _alone(
         return ""
     name = fitted.names[int(np.nanargmax(fitted.w))]
     text = f"{name} has the largest |w|, {np.nanmax(fitted.w):.1f}"
-    others = np.isin(names, fitted.names) & (np.array(names) != name)
-    if others.sum() <= FEWEST:
+    remaining = np.isin(names, fitted.names) & (np.array(names) != name)
+    if remaining.sum() <= FEWEST:
         return text
-    again = fit_pose(
-        [n for n, other in zip(names, others, strict=True) if other],
-        first[others],
-        second[others],
+    refit = fit_pose(
+        [n for n, stays in zip(names, remaining, strict=True) if stays],
+        first[remaining],
+        second[remaining],
         frame=fitted.frame,
-        covariance=covariance.of(others),
+        covariance=covariance.of(remaining),
     )
-    if again.p >= RIGID:
-        return f"{text}; without it the others move as one (p {again.p:.2g}); leave it out by points or robust"
-    return f"{text}; without it the others do not move as one either (p {again.p:.2g})"
+    if refit.p >= RIGID:
+        return f"{text}; without it the others move as one (p {refit.p:.2g}); leave it out by points or robust"
+    return f"{text}; without it the others do not move as one either (p {refit.p:.2g})"

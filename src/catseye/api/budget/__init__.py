@@ -1,0 +1,1 @@
+"""Uncertainty by input: of one shot, and of coordinates."""
