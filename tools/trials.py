@@ -26,7 +26,17 @@ QUICK = (  # tests that need neither the sources nor a running site
     *("tests/gateways", "tests/vectors"),
 )
 LEFT_OUT = ("tests/cli/live", "tests/cli/scale", "tests/api/live", "tests/api/scale")  # sites and clusters: minutes
-BESIDE = ("tests", "examples", "docs", "benchmarks", "studies", "pyproject.toml", "conftest.py", "README.md", "constraints.txt")
+BESIDE = (
+    "tests",
+    "examples",
+    "docs",
+    "benchmarks",
+    "studies",
+    "pyproject.toml",
+    "conftest.py",
+    "README.md",
+    "constraints.txt",
+)
 CELLS = """
 import json, sys
 for path in sys.argv[1:]:
