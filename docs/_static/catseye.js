@@ -4,6 +4,8 @@ document.addEventListener("DOMContentLoaded", () => {
     const link = toggle.closest("li")?.querySelector("a");
     toggle.closest("summary")?.setAttribute("aria-label", `Pages of ${link?.textContent.trim() ?? "this part"}`);
   }
+  // The words that a button shows are its name.
+  for (const shown of document.querySelectorAll("details.hide summary")) shown.removeAttribute("aria-label");
   // A long formula scrolls by itself: the keyboard must reach it.
   for (const formula of document.querySelectorAll("div.math")) formula.setAttribute("tabindex", "0");
   // A signature on several lines is a list without terms.

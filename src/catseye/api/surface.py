@@ -195,7 +195,7 @@ def surface(
     diameter_m: Annotated[Any, In("m", one=True)] = None,
     centre: Annotated[Any, In("m", many=True)] = (0.0, 0.0),
     vertex: Annotated[Any, In("m", many=True)] = (0.0, 0.0, 0.0),
-    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    axis: Annotated[Any, In("", many=True)] = (0.0, 0.0, 1.0),
     u_mm: Annotated[Any, In("mm", one=True)] = None,
     free: Sequence[str] = ("vertex", "axis", "focal-length"),
     taper_db: Annotated[Any, In("dB", one=True)] = 0.0,
