@@ -6,8 +6,8 @@ document.addEventListener("DOMContentLoaded", () => {
   }
   // The words that a button shows are its name.
   for (const shown of document.querySelectorAll("details.hide summary")) shown.removeAttribute("aria-label");
-  // A long formula scrolls by itself: the keyboard must reach it.
-  for (const formula of document.querySelectorAll("div.math")) formula.setAttribute("tabindex", "0");
+  // A long formula, and a cell's figure on a phone, scrolls by itself: the keyboard must reach it.
+  for (const part of document.querySelectorAll("div.math, .cell_output figure")) part.setAttribute("tabindex", "0");
   // A signature on several lines is a list without terms.
   for (const part of document.querySelectorAll("dt.sig dl, dt.sig dd")) part.setAttribute("role", "presentation");
 });
