@@ -49,7 +49,7 @@ def nights_text(data):
         rows.append([title, *cells])
     rows.append(["bad shots rejected with the right reason", *(f"{n['right']} of {n['bad']}" for n in nights)])
     rows.append(["good shots rejected with them", *(f"{n['lost']} of {n['good']}" for n in nights)])
-    rows.append(["innocent thermometers named", *(str(n["innocent_thermometers_named"]) for n in nights)])
+    rows.append(["correct thermometers named as biased", *(str(n["innocent_thermometers_named"]) for n in nights)])
     return table(head, rows)
 
 

@@ -65,11 +65,15 @@ class _Inputs(NamedTuple):
         typer.Argument(metavar="OBSERVATIONS.csv", help="Shots with their weather: catseye help formats/baseline."),
     ]
     heights: Annotated[
-        Path | None, typer.Option("--heights", metavar="HEIGHTS.csv", help="Heights of pillars; level without.")
+        Path | None, typer.Option("--heights", metavar="HEIGHTS.csv", help="Heights of pillars; level if not given.")
     ] = None
     against: Annotated[
         Path | None,
-        typer.Option("--against", metavar="BASELINE.toml", help="Known pillars: finds the instrument's scale, too."),
+        typer.Option(
+            "--against",
+            metavar="BASELINE.toml",
+            help="Record of known pillars: determines the instrument's scale, too.",
+        ),
     ] = None
 
 
@@ -93,7 +97,11 @@ class _Settings(NamedTuple):
     ] = 0.13
     reference_height_m: Annotated[
         float | None,
-        typer.Option("--reference-height-m", callback=_height, help="Height of the distances; the first pillar's."),
+        typer.Option(
+            "--reference-height-m",
+            callback=_height,
+            help="Height to which distances are reduced; the first pillar's if not given.",
+        ),
     ] = None
     u_temperature_c: Annotated[
         float, _u("--u-temperature-c", "Standard uncertainty of the temperatures, common to all shots, °C (1σ).")
@@ -119,7 +127,9 @@ class _Settings(NamedTuple):
     unit_length_m: Annotated[
         float | None,
         typer.Option(
-            "--unit-length-m", callback=_above_zero, help="Unit length of cyclic terms: half a wave, m; none without."
+            "--unit-length-m",
+            callback=_above_zero,
+            help="Unit length of cyclic terms: half a modulation wavelength, m; none if not given.",
         ),
     ] = None
     cyclic_orders: Annotated[int, typer.Option("--cyclic-orders", min=1, max=4, help="Orders of cyclic terms.")] = 1
@@ -128,7 +138,7 @@ class _Settings(NamedTuple):
     ] = 0.6
     specified_ppm: Annotated[float, _u("--specified-ppm", "Maker's claim a + b D: b, ppm (1σ).")] = 1.0
     level: Annotated[float, typer.Option("--level", callback=_level, help="Level of each test.")] = 0.05
-    reject: Annotated[bool, typer.Option("--reject", help="Rejection of what the tests object to, one by one.")] = False
+    reject: Annotated[bool, typer.Option("--reject", help="Reject shots that fail the tests, one at a time.")] = False
 
 
 class _Provenance(NamedTuple):

@@ -29,7 +29,7 @@ def calibrate(  # noqa: PLR0913 - its options are its command line
         typer.Option("--sheet", metavar="SHEET.toml", help="Person, day, instruments; READINGS.toml if not given."),
     ] = None,
     reject: Annotated[
-        bool, typer.Option("--reject", help="Rejection of readings that the tests object to, one by one.")
+        bool, typer.Option("--reject", help="Reject readings that fail the tests, one at a time.")
     ] = False,
     write: Annotated[
         Path | None, typer.Option("--write", metavar="RECORD.toml", help="Record to write: new, or an earlier one.")

@@ -114,7 +114,7 @@ Threads = Annotated[
         metavar="N",
         min=1,
         callback=_with_threads,
-        help="Threads of linear algebra; without, OPENBLAS_NUM_THREADS, or as many as there are free cores.",
+        help="Threads for linear algebra; if not given OPENBLAS_NUM_THREADS, or the free cores.",
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress, no text.")]
@@ -211,7 +211,7 @@ def demo(
 def examples(
     directory: Annotated[
         Path | None,
-        typer.Argument(metavar="[DIR]", help="Directory to write them all to: new or empty; listed without."),
+        typer.Argument(metavar="[DIR]", help="Directory to copy them to, new or empty; without it they are listed."),
     ] = None,
     json: Json = False,
 ) -> None:

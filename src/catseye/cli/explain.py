@@ -26,7 +26,8 @@ def explain(  # noqa: PLR0913 - its options are its command line
     ],
     shot: Annotated[int, typer.Argument(metavar="SHOT", help="Number of the shot in shots.csv.")],
     page: Annotated[
-        Path | None, typer.Option("--page", metavar="FILE.html", help="Page to write: new, or an earlier one of these.")
+        Path | None,
+        typer.Option("--page", metavar="FILE.html", help="HTML page to write: new, or an earlier one of this command."),
     ] = None,
     monte_carlo: Annotated[
         int, typer.Option("--monte-carlo", metavar="N", callback=_draws, help="Draws of the Monte Carlo; 0 for none.")

@@ -19,7 +19,7 @@ Processes = Annotated[
         "--processes",
         metavar="N",
         min=1,
-        help="Processes of one thread each; without, as many as cores are free and memory allows.",
+        help="Processes of one thread each; if not given as many as free cores and memory allow.",
     ),
 ]
 Cluster = Annotated[
@@ -31,7 +31,7 @@ Cluster = Annotated[
     ),
 ]
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Continuation of an earlier run: what is done of the same inputs stays.")
+    bool, typer.Option("--resume", help="Continue an earlier run: finished work on the same inputs is kept.")
 ]
 
 

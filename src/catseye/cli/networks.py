@@ -71,9 +71,9 @@ class _Treatment(NamedTuple):
 
     datum: Datum = None
     scale_by_variance_factor: Scaled = False
-    reject: Annotated[bool, typer.Option("--reject", help="Rejection of observations by the tests, one by one.")] = (
-        False
-    )
+    reject: Annotated[
+        bool, typer.Option("--reject", help="Reject observations that fail the tests, one at a time.")
+    ] = False
     robust: Annotated[
         str | None,
         typer.Option(
@@ -89,11 +89,14 @@ class _Treatment(NamedTuple):
             "--components",
             metavar=COMPONENTS,
             callback=one_of(COMPONENTS),
-            help="Estimation of the claims themselves: constant and ppm part of each ranger, or a factor a group.",
+            help="Estimate variance components: constant and ppm part of each ranger, or a factor per group.",
         ),
     ] = None
     level: Annotated[
-        float, typer.Option("--level", callback=_level, help="Level of the tests, of all single ones together.")
+        float,
+        typer.Option(
+            "--level", callback=_level, help="Significance level of the tests, for all single tests together."
+        ),
     ] = 0.05
     iterations: Annotated[
         int | None,
@@ -121,7 +124,7 @@ def adjust(  # noqa: PLR0913 - its options are its command line
     *,
     network: Annotated[Path, typer.Argument(metavar="NETWORK", help=f"{SUFFIXES}.")],
     later: Annotated[
-        Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch: what moved?")
+        Path | None, typer.Argument(metavar="[LATER]", help="The same network at a later epoch, to compare.")
     ] = None,
     treatment: _Treatment,
     claim: _Claim,
@@ -139,7 +142,7 @@ def adjust(  # noqa: PLR0913 - its options are its command line
             metavar="DIR",
             is_eager=True,
             callback=_template,
-            help="Folder for tables to begin with; nothing else is done.",
+            help="Write template tables to this folder and exit.",
         ),
     ] = None,
     out: Out = None,

@@ -23,13 +23,13 @@ def night(  # noqa: PLR0913 - its options are its command line
     interval_s: Annotated[float, typer.Option(help="Time between two shots of a ranger, s.")] = 8.0,
     again: Annotated[
         float,
-        typer.Option(help="Further shots of each feed-arm ranger at each prism; a fraction is a share."),
+        typer.Option(help="Repeat shots of each feed-arm ranger at each prism; a fraction repeats that share."),
     ] = 0.43,
     nature: Annotated[
         float,
         typer.Option(
-            help="Strength of what air, thermometers and steel do beyond a smooth night: 1 is up to nature's own, "
-            "0 an even drift and a rigid telescope."
+            help="Strength of air waves, fronts, thermometer lags and thermal expansion: 1 up to natural strength, "
+            "0 a steady drift and a rigid telescope."
         ),
     ] = 1.0,
     json: Json = False,

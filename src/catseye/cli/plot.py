@@ -78,7 +78,7 @@ def sky(  # noqa: PLR0913 - its options are its command line
     ] = None,
     end: Annotated[
         str | None,
-        typer.Option("--to", metavar="AZ,EL", callback=_pair, help="Counts at its end; the way round is drawn."),
+        typer.Option("--to", metavar="AZ,EL", callback=_pair, help="Counts at its end; the detour is drawn."),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -179,14 +179,14 @@ def aberration(
 def coating(
     out: Out,
     names: Annotated[
-        list[str] | None, typer.Option("--name", help="A coating; again for more. Usual ones if none.")
+        list[str] | None, typer.Option("--name", help="Coating; may repeat. The usual ones if not given.")
     ] = None,
     wavelength_um: Annotated[float, typer.Option("--wavelength-um", help="Vacuum wavelength, µm.")] = 0.780,
     incidence_deg: Annotated[float, typer.Option(help="Incidence for which films are made, degrees.")] = 0.0,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Coatings against angle and wavelength: reflectance, and what a range reads too long."""
+    """Coatings against angle and wavelength: reflectance and range error."""
     from catseye.api.figures import plot_coating
 
     result = plot_coating(names or (), wavelength_um=wavelength_um, incidence_deg=incidence_deg)

@@ -22,17 +22,19 @@ class _Forbidden(NamedTuple):
     """Time and place of the mirror, and its keep-out regions."""
 
     at_mjd: Annotated[
-        str | None, typer.Option("--at", metavar="TIME", help="Time, UTC or MJD: is the Sun in the way?")
+        str | None, typer.Option("--at", metavar="TIME", help="Time, UTC or MJD, for a check against the Sun.")
     ] = None
     latitude_deg: Annotated[
-        float | None, typer.Option("--latitude-deg", help="Latitude of the site; the monument's record without.")
+        float | None, typer.Option("--latitude-deg", help="Latitude of the site; the monument record's if not given.")
     ] = None
     longitude_deg: Annotated[
         float | None,
-        typer.Option("--longitude-deg", help="Longitude of the site, east positive; the monument's record without."),
+        typer.Option(
+            "--longitude-deg", help="Longitude of the site, east positive; the monument record's if not given."
+        ),
     ] = None
     sun_cone_deg: Annotated[
-        float | None, typer.Option("--sun-cone-deg", help="Half angle kept from the Sun.  [default: 5]")
+        float | None, typer.Option("--sun-cone-deg", help="Half angle of the closed cone around the Sun.  [default: 5]")
     ] = None
     keep_out: Annotated[
         Path | None, typer.Option("--keep-out", metavar="BOXES.toml", help="Boxes that no beam may enter.")
@@ -48,7 +50,7 @@ class _View(NamedTuple):
             "--reflector",
             metavar=REFLECTORS,
             callback=one_of(REFLECTORS),
-            help="Retroreflector at the points: is it visible?",
+            help="Retroreflector at the points, to check visibility.",
         ),
     ] = None
     facing: Annotated[
@@ -58,7 +60,7 @@ class _View(NamedTuple):
         ),
     ] = None
     solids: Annotated[
-        Path | None, typer.Option("--solids", metavar="SOLIDS.toml", help="Obstacles that may stand in the way.")
+        Path | None, typer.Option("--solids", metavar="SOLIDS.toml", help="Obstacles that may block the beam.")
     ] = None
     posture_deg: Annotated[
         str | None,

@@ -172,3 +172,9 @@ def test_a_fence_that_is_never_closed_ends_with_the_page():
 )
 def test_a_formula_is_a_line_of_unicode(tex, text):
     assert plain_formula(tex) == text
+
+
+@pytest.mark.parametrize(("tag", "shown"), [("hide-input", True), ("remove-input", False), ("remove-cell", False)])
+def test_code_that_the_built_page_leaves_out_is_left_out(tag, shown):
+    cell = f"# Page\n\n```{{code-cell}} ipython3\n:tags: [{tag}]\n%config Backend.formats = 1\n```\n\nText.\n"
+    assert ("%config" in plain_markdown(cell)) == shown

@@ -44,10 +44,10 @@ def air(  # noqa: PLR0913 - its options are its command line
     mercury_c: Annotated[float | None, typer.Option("--mercury-c", help="Temperature of the mercury, °C.")] = None,
     gravity: Annotated[float | None, typer.Option("--gravity", help="Gravity at the barometer, m/s².")] = None,
     latitude_deg: Annotated[
-        float | None, typer.Option("--latitude-deg", help="Latitude, degrees, for gravity where none is given.")
+        float | None, typer.Option("--latitude-deg", help="Latitude, degrees, for gravity if not given.")
     ] = None,
     elevation_m: Annotated[
-        float | None, typer.Option("--elevation-m", help="Elevation above sea level, m, for the same.")
+        float | None, typer.Option("--elevation-m", help="Elevation above sea level, m, for gravity.")
     ] = None,
     above_barometer_m: Annotated[
         float, typer.Option("--above-barometer-m", help="Height of this air above the barometer, m.")
@@ -78,7 +78,7 @@ def air(  # noqa: PLR0913 - its options are its command line
     u_co2_ppm: Annotated[float, typer.Option(help="Standard uncertainty of the carbon dioxide, ppm.", **U)] = 0.0,
     surface_c: Annotated[
         float | None,
-        typer.Option("--surface-c", help="Temperature of a retroreflector, °C: will it dew or frost over?"),
+        typer.Option("--surface-c", help="Temperature of a retroreflector, °C, to test for dew or frost."),
     ] = None,
     u_surface_c: Annotated[
         float, typer.Option(help="Standard uncertainty of the surface's temperature, °C.", **U)

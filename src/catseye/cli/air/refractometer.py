@@ -33,7 +33,8 @@ def refractometer(  # noqa: PLR0913 - its options are its command line
         Path, typer.Argument(metavar="FILE.csv", help="Phases with their weather: catseye help formats/refractometer.")
     ],
     sheet: Annotated[
-        Path | None, typer.Option("--sheet", metavar="FILE.toml", help="Sheet of the path; FILE.toml beside.")
+        Path | None,
+        typer.Option("--sheet", metavar="FILE.toml", help="Sheet of the path; FILE.toml beside FILE.csv if not given."),
     ] = None,
     path_length_m: Annotated[
         float | None,

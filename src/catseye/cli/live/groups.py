@@ -61,7 +61,9 @@ PageNames = Annotated[
     list[str] | None,
     typer.Option("--page-name", metavar="NAME", help="Further name that browsers call the page by; may repeat."),
 ]
-Host = Annotated[str | None, typer.Option("--host", help="Address of its own port, or unix:DIR.  [default: 127.0.0.1]")]
+Host = Annotated[
+    str | None, typer.Option("--host", help="Address to listen at for clients, or unix:DIR.  [default: 127.0.0.1]")
+]
 
 
 def arguments(group: NamedTuple) -> dict[str, Any]:

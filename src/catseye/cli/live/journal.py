@@ -21,7 +21,7 @@ app.add_typer(journal, name="journal")
 
 @journal.command(
     epilog="\b\nExample: catseye journal check night.db --head 8123:5f0c3b1e9a7d2c44\n"
-    "Heads stand in the coordinator's log, at each epoch and at the end"
+    "Heads are in the coordinator's log, at each epoch and at the end"
 )
 def check(
     journal: JournalArgument,
@@ -40,7 +40,7 @@ def check(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Hold each event against the chain of hashes: changed, missing, put in, another history, and from where on."""
+    """Check each event against the chain of hashes: changed, missing, inserted, rewritten, and from where on."""
     from catseye.api.journal import check_journal
 
     progress = ProgressLine(quiet)

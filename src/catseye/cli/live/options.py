@@ -68,18 +68,23 @@ JournalPlace = Annotated[
     ),
 ]
 KeepBuffers = Annotated[
-    bool, typer.Option("--keep-buffers/--no-buffers", help="Store samples, too, without which no replay is exact.")
+    bool, typer.Option("--keep-buffers/--no-buffers", help="Store raw samples, too: an exact replay needs them.")
 ]
 RotateGb = Annotated[
     float,
     typer.Option(
         "--rotate-gb",
         callback=within(0, 1e6, " GB"),
-        help="Size from which the journal continues in another file (site-2.db, ...), GB; 0: never.",
+        help="Size at which the journal continues in a new file (site-2.db, ...), GB; 0: never.",
     ),
 ]
-RotateNight = Annotated[bool, typer.Option("--rotate-night", help="Continue the journal in another file at noon UTC.")]
-Mode = Annotated[str, typer.Option("--mode", metavar=MODES, callback=one_of(MODES), help="Fire, listen, or rest.")]
+RotateNight = Annotated[bool, typer.Option("--rotate-night", help="Continue the journal in a new file at noon UTC.")]
+Mode = Annotated[
+    str,
+    typer.Option(
+        "--mode", metavar=MODES, callback=one_of(MODES), help="active measures, passive only listens, hold stays idle."
+    ),
+]
 Drop = Annotated[list[str] | None, typer.Option("--drop", metavar="RANGER", help="Leave a ranger out; may repeat.")]
 RoundS = Annotated[float, typer.Option("--round-s", callback=within(2, 600, " s"), help="Length of a round, s.")]
 FilterName = Annotated[
@@ -87,13 +92,13 @@ FilterName = Annotated[
 ]
 Port = Annotated[
     int | None,
-    typer.Option("--port", callback=within(0, 65_535, ""), help="Port of its own clients.  [default: 5260]"),
+    typer.Option("--port", callback=within(0, 65_535, ""), help="Port for clients.  [default: 5260]"),
 ]
 KeepOutFile = Annotated[
     Path | None, typer.Option("--keep-out", metavar="BOXES.toml", help="Boxes that no beam may enter.")
 ]
 InterlocksFile = Annotated[
-    Path | None, typer.Option("--interlocks", metavar="FILE.toml", help="Times at which rangers may not shine or move.")
+    Path | None, typer.Option("--interlocks", metavar="FILE.toml", help="Times at which rangers may not emit or move.")
 ]
 SolidsFile = Annotated[Path | None, typer.Option("--solids", metavar="SOLIDS.toml", help="Solids that obstruct beams.")]
 

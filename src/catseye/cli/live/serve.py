@@ -16,11 +16,13 @@ from catseye.cli.option_groups import grouped
 def serve(  # noqa: PLR0913 - its options are its command line
     *,
     site: Site,
-    twin: Annotated[bool, typer.Option("--twin", help="Simulated rangers, in a process that is kept alive.")] = False,
+    twin: Annotated[
+        bool, typer.Option("--twin", help="Simulated rangers, in a process that is restarted if it dies.")
+    ] = False,
     simulated: TwinOptions,
     coordinator: CoordinatorOptions,
     page: Annotated[
-        bool, typer.Option("--page/--no-page", help="A page for browsers, in a process that is kept alive.")
+        bool, typer.Option("--page/--no-page", help="A page for browsers, in a process that is restarted if it dies.")
     ] = True,
     browsers: PageOptions,
     log_json: LogJson = False,

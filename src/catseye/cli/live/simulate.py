@@ -48,7 +48,7 @@ def simulate(  # noqa: PLR0913 - its options are its command line
     faults: Faults = None,
     start_mjd: Start = None,
     conditions: Conditions = "night",
-    cold: Annotated[bool, typer.Option("--cold", help="Rangers are just powered on: half a minute more.")] = False,
+    cold: Annotated[bool, typer.Option("--cold", help="Start the rangers from power-on: half a minute more.")] = False,
     drop: Drop = None,
     round_s: RoundS = 10.0,
     filter_: FilterName = "random_walk",
@@ -57,7 +57,7 @@ def simulate(  # noqa: PLR0913 - its options are its command line
     port_base: PortBase = PORT_BASE,
     port: Port = None,
     fast: Annotated[
-        bool, typer.Option("--fast", help="Virtual time: as fast as it goes, the same each time, no ports.")
+        bool, typer.Option("--fast", help="Virtual time: as fast as possible, reproducible, no ports.")
     ] = False,
     runs: Annotated[
         int,

@@ -38,7 +38,7 @@ def ziy(
     screen: Screen = False,
     quiet: Quiet = False,
 ) -> None:
-    """Run a site's coordinator until Ctrl-C: plan, shoot, reduce, keep a journal, tell whoever asks."""
+    """Run a site's coordinator until Ctrl-C: plan, shoot, reduce, keep a journal, answer clients."""
     from catseye.api.live.serving import ziy as run
 
     end = run(

@@ -30,7 +30,7 @@ def _pair(text: str) -> tuple[int, int]:
 
 @app.command(
     epilog="\b\nExample: catseye zy gbt ZY101 --twin\n"
-    "A person at it: nc 127.0.0.1 24110\n"
+    "By hand: nc 127.0.0.1 24110\n"
     "A real one: catseye zy sites/ours ZY101 --head our.heads:card --host 0.0.0.0 --ports 5240,5241"
 )
 @grouped
@@ -52,16 +52,16 @@ def zy(  # noqa: PLR0913 - its options are its command line
             help="Offset of the twin's time from this machine's UTC.  [default: so that it is --start now]",
         ),
     ] = None,
-    cold: Annotated[bool, typer.Option("--cold", help="The twin's rangers are just powered on, not ready.")] = False,
+    cold: Annotated[bool, typer.Option("--cold", help="Start the twin's rangers from power-on.")] = False,
     laser_at_boot: Annotated[
-        bool, typer.Option("--laser-at-boot", help="Laser on as soon as the hardware is, as the notes' rangers.")
+        bool, typer.Option("--laser-at-boot", help="Switch the laser on at power-up, as the notes' rangers do.")
     ] = False,
     host: Annotated[
         str | None, typer.Option("--host", help="Address to listen at, or unix:DIR.  [default: 127.0.0.1]")
     ] = None,
     port_base: PortBase = PORT_BASE,
     ports: Annotated[
-        str | None, typer.Option("--ports", metavar="A,B", callback=_ports, help="Ports of the one ranger.")
+        str | None, typer.Option("--ports", metavar="A,B", callback=_ports, help="Ports, where one ranger is served.")
     ] = None,
     loopback: Annotated[
         bool, typer.Option("--loopback", help="Ranger k at 127.0.8.k, ports 5240 and 5241, as real ones.")

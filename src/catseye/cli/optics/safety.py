@@ -30,7 +30,7 @@ def safety(  # noqa: PLR0913 - its options are its command line
         bool, typer.Option("--aided", help="Sweep, return and near end of the hazard through 7x50 binoculars.")
     ] = False,
     scan_rad_per_s: Annotated[
-        float | None, typer.Option("--scan-rad-per-s", help="Rate at which the beam (not the mirror) turns, rad/s.")
+        float | None, typer.Option("--scan-rad-per-s", help="Angular rate of the beam (not the mirror), rad/s.")
     ] = None,
     scan_period_s: Annotated[
         float | None,
@@ -44,7 +44,10 @@ def safety(  # noqa: PLR0913 - its options are its command line
         float, typer.Option("--reflector-diameter-mm", help="Diameter of the retroreflector's clear face, mm.")
     ] = 50.8,
     subtense_mrad: Annotated[
-        float, typer.Option("--subtense-mrad", help="Angle of the apparent source where the eye is; up to 1.5 a point.")
+        float,
+        typer.Option(
+            "--subtense-mrad", help="Angular subtense of the apparent source at the eye; up to 1.5 is a point source."
+        ),
     ] = 1.5,
     edition: Annotated[
         str, typer.Option("--edition", metavar=EDITIONS, callback=one_of(EDITIONS), help="Edition of the limits.")

@@ -17,9 +17,9 @@ ArchiveDirectory = Annotated[Path, typer.Argument(metavar="DIR", help="Directory
 class Upkeep(NamedTuple):
     """Options beside the sources; see `option_groups.grouped`."""
 
-    check: Annotated[bool, typer.Option("--check", help="Comparison of every file with its SHA-256.")] = False
+    check: Annotated[bool, typer.Option("--check", help="Compare every file with its SHA-256.")] = False
     compact: Annotated[
-        bool, typer.Option("--compact", help="Tables of each year joined to one file a kind: quicker series.")
+        bool, typer.Option("--compact", help="Join each year's tables into one file per kind, for faster series.")
     ] = False
     remove: Annotated[
         list[str] | None,
@@ -40,7 +40,9 @@ def archive(
     sources: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[SOURCE ...]", help="Campaigns and journals to add; none: what is there.", show_default=False
+            metavar="[SOURCE ...]",
+            help="Campaigns and journals to add; without any, the contents are listed.",
+            show_default=False,
         ),
     ] = None,
     upkeep: Upkeep = NO_UPKEEP,

@@ -31,14 +31,14 @@ class _Question(NamedTuple):
     ] = Path("gbt")
     pose: Annotated[str | None, typer.Option("--pose", metavar="BODY", help="Pose of a body by night: dish.")] = None
     certificates: Annotated[
-        str | None, typer.Option("--certificates", metavar="NIGHT", help="Certificates that a night stood on.")
+        str | None, typer.Option("--certificates", metavar="NIGHT", help="Certificates that a night used.")
     ] = None
     sql: Annotated[str | None, typer.Option("--sql", metavar="SELECT", help="One SELECT over the tables.")] = None
     again: Annotated[
         str | None, typer.Option("--again", metavar="NIGHT", help="Difference of a night reduced again.")
     ] = None
     calibrations: Annotated[
-        Path | None, typer.Option("--calibrations", metavar="SITE", help="Records of today, for --again.")
+        Path | None, typer.Option("--calibrations", metavar="SITE", help="Current records, for --again.")
     ] = None
     since: Annotated[
         str | None, typer.Option("--from", metavar="TIME", help="First time, UTC or MJD.  [default: the start]")

@@ -44,7 +44,7 @@ def panels(  # noqa: PLR0913 - its options are its command line
         float, typer.Option("--focal-length-m", callback=_focal, help="Focal length of a LAYOUT.csv's paraboloid.")
     ] = 60.0,
     reject: Annotated[
-        bool, typer.Option("--reject", help="Rejected readings are left out; without, named only.")
+        bool, typer.Option("--reject", help="Leave out rejected readings; otherwise they are only named.")
     ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Directory to write: report, list of screws, tables.")

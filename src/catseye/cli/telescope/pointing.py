@@ -44,10 +44,10 @@ def fit(  # noqa: PLR0913 - its options are its command line
     terms: Annotated[str, typer.Option("--terms", help="Terms to fit.")] = TERMS,
     u_arcsec: Annotated[
         float | None,
-        typer.Option("--u-arcsec", help="Uncertainty of each coordinate of a star; from the scatter without."),
+        typer.Option("--u-arcsec", help="Uncertainty of each coordinate of a star; from the scatter if not given."),
     ] = None,
     reject: Annotated[
-        bool, typer.Option("--reject", help="Rejection of observations with |w| beyond 4, one by one.")
+        bool, typer.Option("--reject", help="Reject observations with |w| above 4, one at a time.")
     ] = False,
     write: Annotated[
         Path | None, typer.Option("--write", metavar="MODEL.toml", help="File of the series with its covariance.")
@@ -108,7 +108,7 @@ def track(
     tilts: Annotated[
         Path | None, typer.Option("--tilts", metavar="TILTS.csv", help="Readings of an inclinometer on the alidade.")
     ] = None,
-    harmonics: Annotated[int, typer.Option("--harmonics", min=0, max=36, help="Waves a turn.")] = 2,
+    harmonics: Annotated[int, typer.Option("--harmonics", min=0, max=36, help="Number of harmonics per turn.")] = 2,
     out: Out = None,
     json: Json = False,
     quiet: Quiet = False,

@@ -24,7 +24,8 @@ def pose(  # noqa: PLR0913 - its options are its command line
         Path, typer.Argument(metavar="EPOCH", help="Output of catseye reduce --out, or a table of points.")
     ],
     earlier: Annotated[
-        Path | None, typer.Argument(metavar="[EARLIER]", help="The epoch to count from; the site's design without.")
+        Path | None,
+        typer.Argument(metavar="[EARLIER]", help="Earlier epoch to compare with; the site's design if not given."),
     ] = None,
     *,
     site: Annotated[
@@ -57,7 +58,7 @@ def pose(  # noqa: PLR0913 - its options are its command line
             "--pivot",
             metavar="X,Y,Z",
             callback=row_of(3, "x,y,z in metres"),
-            help="Centre of rotation, m, in the frame; vertex, focus or mean of the points without.",
+            help="Centre of rotation, m, in the frame; vertex, focus or mean of the points if not given.",
         ),
     ] = None,
     robust: Annotated[
@@ -66,7 +67,7 @@ def pose(  # noqa: PLR0913 - its options are its command line
             "--robust",
             metavar=POSE_WEIGHTS,
             callback=one_of(POSE_WEIGHTS),
-            help="Weights that leave out points that moved alone.",
+            help="Robust weights, which leave out points that moved on their own.",
         ),
     ] = None,
     pointing: Annotated[
@@ -84,17 +85,22 @@ def pose(  # noqa: PLR0913 - its options are its command line
             "--tilt",
             metavar="X,Y,U",
             callback=row_of(3, "X,Y,U in arc seconds"),
-            help="Inclinometer on the alidade, arcsec, its zero taken out.",
+            help="Inclinometer on the alidade, arcsec, with its zero removed.",
         ),
     ] = None,
     posture_deg: Annotated[
         str | None,
-        typer.Option("--posture", metavar="AZ,EL", callback=POSTURE, help="Posture of EPOCH; its pose.json's without."),
+        typer.Option(
+            "--posture", metavar="AZ,EL", callback=POSTURE, help="Posture of EPOCH; from its pose.json if not given."
+        ),
     ] = None,
     earlier_posture_deg: Annotated[
         str | None,
         typer.Option(
-            "--earlier-posture", metavar="AZ,EL", callback=POSTURE, help="Posture of EARLIER; its pose.json's without."
+            "--earlier-posture",
+            metavar="AZ,EL",
+            callback=POSTURE,
+            help="Posture of EARLIER; from its pose.json if not given.",
         ),
     ] = None,
     u_mm: Annotated[

@@ -68,7 +68,7 @@ def structure(  # noqa: PLR0913 - its options are its command line
     pivot: Annotated[
         str | None,
         typer.Option(
-            "--pivot", metavar="X,Y,Z", callback=_pivot, help="Pivot of turns, m, in the frame.  [default: middle]"
+            "--pivot", metavar="X,Y,Z", callback=_pivot, help="Pivot of rotations, m, in the frame.  [default: middle]"
         ),
     ] = None,
     harmonics: Annotated[int, typer.Option("--harmonics", min=1, max=2, help="Number of harmonics of elevation.")] = 1,
@@ -82,7 +82,7 @@ def structure(  # noqa: PLR0913 - its options are its command line
             "--own",
             metavar=OWN_FUNCTIONS,
             callback=one_of(OWN_FUNCTIONS),
-            help="Functions of a single point: its place, or all.",
+            help="Functions that each point has of its own: a constant offset, or all.",
         ),
     ] = "place",
     scatter: Annotated[
@@ -100,19 +100,20 @@ def structure(  # noqa: PLR0913 - its options are its command line
     ] = None,
     temperature_c: Annotated[
         float | None,
-        typer.Option("--temperature-c", help="Temperature of the prediction; the mean of the epochs without."),
+        typer.Option("--temperature-c", help="Temperature of the prediction; the epochs' mean if not given."),
     ] = None,
     way: Annotated[
-        float, typer.Option("--way", min=-1, max=1, help="Direction of the last move of the prediction: 1 up, -1 down.")
+        float,
+        typer.Option(
+            "--way", min=-1, max=1, help="Last elevation move before the prediction: 1 up, -1 down, 0 mean of both."
+        ),
     ] = 0.0,
     stretch_s: Annotated[
-        float | None, typer.Option("--stretch-s", help="Segment of a spectrum, s; resolution is 1.5 over it.")
+        float | None, typer.Option("--stretch-s", help="Length of a spectrum segment, s; the resolution is 1.5/length.")
     ] = None,
     less: Annotated[
         str | None,
-        typer.Option(
-            "--less", metavar="RANGER:TARGET", help="Series of a vibration, subtracted from the others of its ranger."
-        ),
+        typer.Option("--less", metavar="RANGER:TARGET", help="Series to subtract from the ranger's other series."),
     ] = None,
     out: Out = None,
     threads: Threads = None,

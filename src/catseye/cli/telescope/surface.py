@@ -48,11 +48,11 @@ class _Design(NamedTuple):
             "--focal-length-m",
             min=0.05,
             max=1000.0,
-            help="Focal length of a dish without a site, m; roughly where it is fitted.",
+            help="Focal length of a dish without a site, m; approximate if it is fitted.",
         ),
     ] = None
     radius_m: Annotated[
-        float | None, typer.Option("--radius-m", min=0.02, max=500.0, help="Radius of its aperture, m; or")
+        float | None, typer.Option("--radius-m", min=0.02, max=500.0, help="Radius of its aperture, m.")
     ] = None
     diameter_m: Annotated[
         float | None, typer.Option("--diameter-m", min=0.04, max=1000.0, help="Diameter of its aperture, m.")
@@ -94,11 +94,11 @@ class _Shape(NamedTuple):
         str, typer.Option("--free", metavar="vertex,axis,focal-length|none", callback=_free, help="Fitted parts.")
     ] = "vertex,axis,focal-length"
     taper_db: Annotated[
-        float, typer.Option("--taper-db", min=0.0, max=60.0, help="Illumination's edge below its middle, dB.")
+        float, typer.Option("--taper-db", min=0.0, max=60.0, help="Edge taper of the illumination, dB.")
     ] = 0.0
     frequency_ghz: Annotated[
         list[float] | None,
-        typer.Option("--frequency-ghz", callback=_frequencies, help="Frequency of a gain, GHz; repeats."),
+        typer.Option("--frequency-ghz", callback=_frequencies, help="Frequency for the gain, GHz; may repeat."),
     ] = None
     zernike: Annotated[int, typer.Option("--zernike", min=1, max=500, help="Number of Zernike terms.")] = 15
     order: Annotated[
@@ -159,7 +159,7 @@ class _Corrections(NamedTuple):
     ] = None
     positions: Annotated[
         Path | None,
-        typer.Option("--positions", metavar="FILE.csv", help="Positions of the actuators; their middle without."),
+        typer.Option("--positions", metavar="FILE.csv", help="Positions of the actuators; mid-travel if not given."),
     ] = None
     travel: Annotated[
         str,

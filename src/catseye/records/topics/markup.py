@@ -126,6 +126,9 @@ def _rendered(directive: Directive) -> list[str]:
 
 
 def _code(directive: Directive) -> list[str]:
+    """Fenced block of a directive's code; none where the built page does not show it either."""
+    if "remove-" in directive.options.get("tags", ""):
+        return []
     language = CODES[directive.kind] or directive.argument
     return ["", f"```{language}", *_trimmed(directive.body), "```", ""]
 
