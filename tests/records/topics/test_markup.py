@@ -172,3 +172,12 @@ def test_a_fence_that_is_never_closed_ends_with_the_page():
 )
 def test_a_formula_is_a_line_of_unicode(tex, text):
     assert plain_formula(tex) == text
+
+
+def test_a_cell_that_the_built_pages_do_not_show_is_not_shown():
+    page = "# Tour\n\n```{code-cell}\n:tags: [remove-cell]\nimport this\n```\n\nA display.\n"
+    assert plain_markdown(page) == "# Tour\n\nA display.\n"
+
+
+def test_a_title_has_no_backslash_of_its_markdown():
+    assert page_title("# Surveys of STAR\\*NET and `CSV`\n") == "Surveys of STAR*NET and CSV"
