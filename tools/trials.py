@@ -62,8 +62,10 @@ def pythons() -> dict[tuple[int, ...], str]:
     """Interpreters on PATH that catseye is for, by version: the one that runs this among them."""
     names = [sys.executable, *(f"python3.{minor}" for minor in range(OLDEST[1], NEWEST_TRIED))]
     paths = [path for name in names if (path := shutil.which(name))]
-    found = {version: path for path in reversed(paths) if (version := version_of(path)) and version[:2] >= OLDEST}
-    return dict(sorted(found.items()))
+    interpreters = {
+        version: path for path in reversed(paths) if (version := version_of(path)) and version[:2] >= OLDEST
+    }
+    return dict(sorted(interpreters.items()))
 
 
 class Trial:
@@ -156,7 +158,7 @@ class Trial:
         for name in BESIDE:
             copy = shutil.copytree if (sources / name).is_dir() else shutil.copy2
             copy(sources / name, tree / name)
-        tools = [str(each) for each in requirements(("dev",)) if each.name in TOOLS]
+        tools = [str(requirement) for requirement in requirements(("dev",)) if requirement.name in TOOLS]
         self.install(*tools)
         place = Path(self.run("python", "-c", "import catseye; print(catseye.__file__)", where=tree).strip())
         if not place.is_relative_to(self.place / "venv"):

@@ -122,7 +122,8 @@ def range_of(parameter: Any) -> str:
             check([value] if is_list(parameter) else value)
         except typer.BadParameter as problem:
             if match := EXPECTED.search(problem.message) or REFUSED.search(problem.message):
-                return re.sub(r"e\+0?(\d+)", r"e\1", match[1].replace(", for none, nor between", " for none, or"))
+                words = re.sub(r", for none, nor between (\S+) and (\S+)", r" for none, or \1 to \2", match[1])
+                return re.sub(r"e\+0?(\d+)", r"e\1", words)
         except (TypeError, ValueError, OverflowError):
             continue
     return ""
@@ -155,8 +156,9 @@ def help_of(parameter: Any) -> str:
 
 
 def marked(text: str) -> str:
-    """Plain text as Markdown, pages of docs as links."""
+    """Plain text as Markdown, pages of docs as links, options as code."""
     text = re.sub(r"([\\`*_\[\]<>$|#~^])", r"\\\1", text)
+    text = re.sub(r"(?<![\w-])--[a-z][a-z0-9-]*", r"`\g<0>`", text)
     return re.sub(r"docs/([\w/-]+\.md)", r"[docs/\1](/\1)", text)
 
 

@@ -97,8 +97,10 @@ def _key(record: type[Record], name: str, described: dict[str, str]) -> Key:
     if not meaning and name.startswith("u_") and name[2:] in described:
         meaning = f"standard uncertainty of `{name[2:]}`"
     elif meaning and name.startswith("u_"):
-        if meaning == described.get(name[2:]):
-            meaning = f"standard uncertainty of `{name[2:]}`"
+        partners = [key for key, text in described.items() if text == meaning and not key.startswith("u_")]
+        if partners:
+            keys = [name[2:]] if name[2:] in partners else partners
+            meaning = f"standard uncertainty of {' and '.join(f'`{key}`' for key in keys)}"
         elif not re.search("uncertaint|scatter|repeatab|resolution|drift", meaning):
             meaning = f"standard uncertainty{'' if meaning.startswith('of ') else ':'} {meaning}"
     return Key(name, _value(name, field), _default(field), meaning)

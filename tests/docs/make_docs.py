@@ -29,6 +29,14 @@ def parts(source: Path, built: Path) -> list[tuple[str, list[str]]]:
     ]
 
 
+def quiet_kernels(place: Path) -> None:
+    """Let the kernels of executed pages report errors alone: nothing leaves this machine."""
+    profile = place / "profile_default"
+    profile.mkdir(parents=True, exist_ok=True)
+    (profile / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n", encoding="utf-8")
+    os.environ["IPYTHONDIR"] = str(place)
+
+
 def browser_lacks() -> str:
     """Reason why the pages cannot be opened in a browser; "" where they can."""
     if not any((Path(place) / name).exists() for place in os.get_exec_path() for name in BROWSER):
@@ -52,6 +60,7 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write("usage: make_docs.py SOURCE BUILT, where SOURCE holds conf.py\n")
         return 2
     source, built = (Path(each).resolve() for each in arguments)
+    quiet_kernels(built / "ipython")
     good = [run(name, command) for name, command in parts(source, built)]
     lacks = browser_lacks()
     if lacks:

@@ -107,10 +107,10 @@ def test_files_that_lack_or_do_not_belong_are_named():
 
 
 def test_the_lowest_versions_are_those_of_the_bounds():
-    given = [
+    texts = [
         Requirement(text) for text in ("numpy>=2,<3", "rich", "a>=2.9", "a>=2.10", "p[b]>=3.1.4; python_version>'3'")
     ]
-    assert lowest(given) == ["numpy==2", "a==2.10", "p==3.1.4"]
+    assert lowest(texts) == ["numpy==2", "a==2.10", "p==3.1.4"]
     names = {line.partition("==")[0] for line in lowest(requirements())}
     assert {"numpy", "scipy", "pyarrow", "uvicorn", "typst", "psycopg"} <= names
 

@@ -62,7 +62,7 @@ def show_topic(
     if json:
         say(json_text(page.to_object()))
         return
-    related = "\n".join(f"- `catseye help {other}`: {titles[other]}" for other in page.related)
+    related = "\n".join(f"- `catseye help {linked}`: {titles[linked]}" for linked in page.related)
     show(page.text + (f"\n## Related topics\n\n{related}\n" if related else ""))
 
 
@@ -118,12 +118,12 @@ def paged(text: str) -> bool:
     program = shlex.split(os.environ.get("PAGER", "less"))
     if not program or shutil.which(program[0]) is None:
         return False
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         place = {**os.environ, "LESS": os.environ.get("LESS", STYLES)}
         subprocess.run(program, input=text.encode(), env=place, check=False)
     except OSError:
         return False
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, handler)
     return True

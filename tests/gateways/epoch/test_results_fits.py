@@ -56,6 +56,11 @@ def plain_tables(content):
     return found
 
 
+def units_of(header):
+    """Unit of each column; "" without."""
+    return {header[f"TTYPE{k}"]: header.get(f"TUNIT{k}", "") for k in range(1, int(header["TFIELDS"]) + 1)}
+
+
 def texts(column):
     return [cell.decode("ascii").rstrip() for cell in column]
 
@@ -103,7 +108,7 @@ def test_zeros_and_pose_are_those_of_the_json_files(directory, tables):
 @pytest.mark.parametrize(("name", "table"), [("RANGES", RANGES), ("POINTS", COORDINATES), ("SURFACE", SURFACE)])
 def test_every_column_of_a_csv_is_there_unrounded_with_its_unit(directory, tables, name, table):
     stored, header = tables[name]
-    units = {header[f"TTYPE{k}"]: header.get(f"TUNIT{k}", "") for k in range(1, int(header["TFIELDS"]) + 1)}
+    units = units_of(header)
     rows = list(csv.DictReader((directory / table.file).read_text(encoding="utf-8").splitlines()))
     assert len(rows) == len(stored)
     for column in table.columns:
@@ -125,6 +130,13 @@ def test_every_column_of_a_csv_is_there_unrounded_with_its_unit(directory, table
             else:
                 digits = len(cell.partition(".")[2])
                 assert value == pytest.approx(float(cell), abs=0.51 * 10.0**-digits, rel=1e-15)
+
+
+def test_zeros_and_pose_are_in_metres_and_radians(tables):
+    assert units_of(tables["ZEROS"][1]) == {"RANGER": "", "ZERO": "m", "U_ZERO": "m"}
+    pose = dict.fromkeys(("PIVOT", "TRANSLATION", "VERTEX", "FOCUS"), "m") | {"ROTATION": "rad"}
+    assert units_of(tables["POSE"][1]) == pose | {"AXIS": "", "COVARIANCE": ""}
+    assert units_of(tables["COVARIANCE"][1])["COVARIANCE"] == "m2"
 
 
 def test_the_provenance_names_each_input_with_its_hash(directory, tables):

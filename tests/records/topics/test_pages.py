@@ -24,7 +24,7 @@ def test_pages_that_only_the_build_fills_are_not_listed():
 
 def test_an_index_has_the_name_of_its_folder_and_leads_to_its_pages():
     formats = read_topic("formats")
-    assert formats.title == "Formats"
+    assert formats.name == "formats"
     assert "formats/beam" in formats.related
     assert {"formats", "howto", "conventions"} <= set(read_topic("index").related)
 

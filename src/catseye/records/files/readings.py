@@ -38,7 +38,7 @@ class Sheet(Record):
     valid_until   last day of validity, after measured_on
     by            person who measured
     report        reference to the report
-    level         of the tests: probability of any false alarm among the readings
+    level         significance level of the tests: probability of any false alarm among the readings
     """
 
     format: Annotated[int | str, Version("readings")] = 1

@@ -29,7 +29,7 @@ class Record(BaseModel):
 class Certificate(Record):
     """Calibration with its provenance; missing provenance in format version 1 reads as None.
 
-    serial        of the calibrated part
+    serial        serial number of the calibrated part
     measured_on   day of the calibration
     valid_until   last day of its validity
     by            person who measured

@@ -36,7 +36,7 @@ SPANS = {
 class BaselineShots:
     """Shots of one instrument on a baseline, each column (m,).
 
-    names              of the pillars, in order of first appearance
+    names              names of the pillars, in order of first appearance
     start, end         indices in `names`
     instrument, target heights above the pillar, m
     slope              slope distance as displayed, m
@@ -137,16 +137,16 @@ class Baseline(Certificate):
     """Calibrated pillars; `BASELINE.toml`.
 
     format                "catseye-baseline-1"
-    name                  of the baseline
+    name                  name of the baseline
     reference_height_m    height at which distances are horizontal; absent without heights
     pillars               names, the first with x = y = 0
-    x_m, y_m              along the line from the first pillar to the last, and to its left
+    x_m, y_m              coordinates of each pillar: along the line from the first to the last, and to its left
     known                 rows and columns of the covariance: "x NAME", "y NAME"
-    covariance_mm2        of these
+    covariance_mm2        covariance matrix of the coordinates in `known`
     s_mm                  experimental standard deviation of a single distance (full test procedure)
-    degrees_of_freedom    of s
-    zero_mm, u_zero_mm    of the instrument that measured it: observed minus true
-    inputs_sha256         by file name
+    degrees_of_freedom    degrees of freedom of s_mm
+    zero_mm, u_zero_mm    zero of the instrument that measured it: observed minus true
+    inputs_sha256         SHA-256 of each input file, by name
     """
 
     format: Annotated[int | str, Version("baseline")]

@@ -20,7 +20,7 @@ class CalibratedQuantity(Record):
     key        name, which ends in the unit
     value      estimate
     u          standard uncertainty
-    unit       of value and u; empty for a pure number
+    unit       unit of value and u; empty for a pure number
     meaning    description, with its sign
     """
 
@@ -48,7 +48,7 @@ class DecisionTable(Record):
 
     least   True if the limit is a minimum, not a maximum
     grave   True if a failure rejects the result; else it makes it doubtful
-    name    of the test
+    name    name of the test
     statistic  value of the test statistic
     limit   critical value
     passed  true if the test passed
@@ -88,13 +88,13 @@ class CalibrationRecord(Record):
     report               reference to the report
     made_by              program and version that wrote the record
     verdict              good, doubtful or failed
-    variance_factor      of the adjustment; missing without degrees of freedom
+    variance_factor      variance factor of the adjustment; missing without degrees of freedom
     degrees_of_freedom   readings less parameters
     method               description of the calibration
     notes                remarks, one a text
     record               values to copy into the record of the instrument
     quantity             calibrated quantities
-    covariance           of the quantities
+    covariance           covariance of the quantities
     decision             tests of the readings
     plausible            limits of the instrument, tested
     readings             table of the readings with residuals

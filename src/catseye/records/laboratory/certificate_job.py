@@ -43,7 +43,7 @@ Bound = Annotated[float, Within(-1e12, 1e12)]
 class Signatory(Record):
     """Person who signs: name, and the role beneath it.
 
-    name   of the person
+    name   name of the person
     role   under the name
     """
 
@@ -54,7 +54,7 @@ class Signatory(Record):
 class LaboratoryRecord(Record):
     """Laboratory that issues certificates.
 
-    name, address    as they head the certificate
+    name, address    name and address in the certificate's heading
     contact          telephone, mail, web, a line each
     logo             PNG or SVG file beside the record
     accreditation    body and number of the accreditation
@@ -84,7 +84,7 @@ class LaboratoryRecord(Record):
 class Customer(Record):
     """Customer of a calibration: name, address and contact.
 
-    name      of the customer
+    name      name of the customer
     address   lines of the address
     contact   person or address to write to
     """
@@ -127,9 +127,10 @@ class WorkEnvironment(Record):
 class ReferenceStandard(Record):
     """Standard that gives traceability, with its own certificate.
 
-    name, serial     of the standard
+    name             name of the standard
+    serial           serial number of the standard
     certificate      number of its certificate
-    laboratory       that issued it
+    laboratory       laboratory that issued its certificate
     calibrated_on, valid_until   dates
     traceability     realisation of the unit, such as "SI metre by PTB"
     """
@@ -150,9 +151,9 @@ class ReferenceStandard(Record):
 class Specification(Record):
     """Limits of a quantity, in its unit.
 
-    key            of the quantity
+    key            key of the quantity
     lower, upper   limits; one may be missing
-    source         of the limits: a specification, a standard
+    source         source of the limits: a specification, a standard
     """
 
     key: Text
@@ -174,15 +175,15 @@ class Specification(Record):
 class CertificateJob(Record):
     """Calibration job as its certificate states it.
 
-    number           of the certificate, after the laboratory's prefix
+    number           number of the certificate, after the laboratory's prefix
     issued_on, received_on   dates of issue and of the item's receipt; the issue is today's without
     order            customer's order
     procedure        document of the procedure
-    place            of the calibration
+    place            place of the calibration
     item             description of the item: maker and model
-    condition        of the item on receipt
+    condition        condition of the item on receipt
     adjustment       work on the item, with results before and after
-    deviations       from the procedure
+    deviations       deviations from the procedure
     remarks          opinions and interpretations
     replaces         number of the certificate that this one amends
     interval_agreed  True if the customer agreed to a date of validity on the certificate

@@ -100,7 +100,7 @@ class SurfacePlate(Record):
     l1_mm, l2_mm      pole points of the left and the right prism
     l_bt_mm           vertex of the ball
     l_post_mm         half-length of the fixture: the synthetic reference plane; u_l_post_mm against gauge blocks
-    u_height_mm       of each of the three heights
+    u_height_mm       of each of l1_mm, l2_mm and l_bt_mm
     top_surface_mm    painted top plate, sampled at several places; optional
     """
 
@@ -117,7 +117,7 @@ class MeasuredPrism(Record):
     """[left_prism] or [right_prism]: from the data sheet of the unit.
 
     serial      serial number
-    height_mm   of the prism, corner to pole point
+    height_mm   height of the prism, corner to pole point
     hrp_mm      fiducial point from the pole point
     pc_mm       prism constant, negative
     """
@@ -153,14 +153,14 @@ class Placement(Record):
     phi_1_rad, phi_2_rad       phases of the left and of the right prism
     phi_zrg_rad                phase of the reference prism
     phi_cal_rad                phase of the zero distance
-    temperature_c              of the air
-    pressure_hpa               of the air
-    humidity_percent           of the air
+    temperature_c              temperature of the air
+    pressure_hpa               pressure of the air
+    humidity_percent           humidity of the air
     phi_bcfp_rad               phase of the ball after the flip
     phi_zrg_flipped_rad, phi_cal_flipped_rad  phases at the flip; without, the reading before it counts
-    temperature_flipped_c      of the air at the flip, likewise
-    pressure_flipped_hpa       of the air at the flip, likewise
-    humidity_flipped_percent   of the air at the flip, likewise
+    temperature_flipped_c      temperature of the air at the flip, likewise
+    pressure_flipped_hpa       pressure of the air at the flip, likewise
+    humidity_flipped_percent   relative humidity of the air at the flip, likewise
     u_phase_rad                of each phase reading
     """
 
@@ -196,11 +196,11 @@ class TripletMeasurement(Certificate):
     measured_on                    day of the measurement
     by                             person who measured
     bk7_to_air_group_index_ratio   n, for which the glass constants are valid
-    bk7_group_index                of the glass; if given, the delay in glass depends on the air of each placement
+    bk7_group_index                group index of the glass; with it, the delay in glass follows each placement's air
     modulation_hz                  frequency of the modulation
-    wavelength_um                  of the light in vacuum
+    wavelength_um                  wavelength of the light in vacuum
     air_model                      formula for the index of air
-    d12_mm, u_d12_mm               between the fiducial points of the prisms
+    d12_mm, u_d12_mm               distance between the fiducial points of the prisms
     u_lateral_mm                   ball centre from the midpoint of the prisms, each direction in the plate
     u_temperature_c, u_pressure_hpa, u_humidity_percent  change of a reading between prisms and flip, without the
                                    offset of the sensor

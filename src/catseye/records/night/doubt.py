@@ -20,7 +20,7 @@ class DoubtRow(Record):
 
     what      shot, or weather reading
     name      number of the shot, or station
-    mjd_utc   as in the other file
+    mjd_utc   time, as in the other file
     why       reason given at the time
     """
 

@@ -55,9 +55,12 @@ class Signal(Record):
     """Reference signal, for `signal.delay.waveform`.
 
     kind                                      "chirp", "pulse" or "mls"
-    start_hz, stop_hz, duration_s, taper      of a chirp
-    centre_hz, duration_s                     of a pulse
-    order, chip_hz, centre_hz                 of a maximum length sequence
+    start_hz, stop_hz                         first and last frequency of a chirp
+    centre_hz                                 centre frequency of a pulse or a maximum length sequence
+    duration_s                                duration of a chirp or a pulse
+    taper                                     share of a chirp over which each end is faded
+    order                                     order of a maximum length sequence, 2^order - 1 chips
+    chip_hz                                   chip rate of a maximum length sequence
     """
 
     kind: Literal["chirp", "pulse", "mls"]
@@ -95,8 +98,8 @@ class AcousticWeather(Record):
     """Weather reading near the path; temperature only predicts the arrival.
 
     mjd_utc            time
-    temperature_c      of the air
-    pressure_hpa       of the air
+    temperature_c      temperature of the air
+    pressure_hpa       pressure of the air
     humidity_percent   relative humidity
     """
 
@@ -121,27 +124,28 @@ class AcousticSheet(Certificate):
     """Sheet of a recording: path, signal, electronics, weather. Defaults are zero effects.
 
     ranger, target         ends A and B: "ab" is the channel of the microphone at the target
-    length_m, u_length_mm  from loudspeaker to microphone, equal in both directions
-    channels               of a WAVE file in order; a .csv names its own
-    sampling_hz            of the files
+    length_m, u_length_mm  distance from loudspeaker to microphone, equal in both directions
+    channels               channels of a WAVE file, in order; a .csv names its own
+    sampling_hz            sampling rate of the files
     recordings             start time of each file
-    emission_s             from a file's first sample to the first signal; shots follow each other by interval_s
+    emission_s             time from a file's first sample to the first signal; further shots follow at interval_s
     window_ms              half width around the predicted arrival; by default for 15 °C and 15 m/s of wind
-    delay_us, u_delay_us   of loudspeaker, microphone and parts outside the loop-back: equal in both directions
+    delay_us, u_delay_us   delay of loudspeaker, microphone and parts outside the loop-back: equal in both directions
     clock_offset_us, u_clock_offset_us   lead of the clock of channel "ab" over that of the emission, and lag of
                            channel "ba", with two recorders; 0 with a common clock
     u_time_us              least standard uncertainty of a travel time: turbulence, converter
-    u_pressure_hpa, u_humidity_percent   of the weather, common to all
-    crosswind_m_per_s, u_crosswind_m_per_s   expected across the path; without an anemometer 0 and the site's rms wind
-    wind_m_per_s, u_wind_m_per_s   along a path measured one way only, positive from ranger to target
+    u_pressure_hpa, u_humidity_percent   of the weather readings, common to all
+    crosswind_m_per_s, u_crosswind_m_per_s   wind across the path; without an anemometer 0 and the site's rms wind
+    wind_m_per_s, u_wind_m_per_s   wind along a path measured one way only, positive from ranger to target
     speed_gradient_per_s, u_speed_gradient_per_s   change of the speed of sound across the path: rays bend
-    frequency_hz           of the sound, for the air's dispersion; by default the signal's
-    weighting, band_hz     of the correlation: "plain", "whitened", "phat"
-    interval_s             between two signals, longer than the window
+    frequency_hz           frequency of the sound, for the air's dispersion; by default the signal's
+    weighting              weighting of the correlation; "phat" is the phase transform
+    band_hz                lowest and highest frequency used in the correlation
+    interval_s             time between two signals, longer than the window
     shots                  number of signals in a file
     signal                 reference signal
     co2_ppm                carbon dioxide in the air
-    wavelength_um          of the light, for the group refractivity of the path
+    wavelength_um          wavelength of the light, for the group refractivity of the path
     weather                readings near the path
     """
 

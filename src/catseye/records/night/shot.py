@@ -28,7 +28,7 @@ class ShotRow(Record):
     mjd_utc             time of the trigger
     ranger              name of the ranger
     target              name of the retroreflector; `ZRG` is the internal cube of the ranger
-    cycles              of the intermediate frequency in the buffer
+    cycles              number of cycles of the intermediate frequency in the buffer
     samples_per_cycle   samples in a cycle
     frame               row of frames.npy, from 0
     """

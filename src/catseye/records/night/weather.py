@@ -15,8 +15,8 @@ class WeatherSample(Record):
 
     mjd_utc         time
     station         name of the station in site.toml
-    temperature_c   of the air
-    pressure_mb     of the air at the station
+    temperature_c   temperature of the air
+    pressure_mb     pressure of the air at the station
     humidity_pct    relative humidity
     """
 

@@ -35,8 +35,8 @@ class ActuatorCorrection(Record):
     """Row of actuators.csv.
 
     x_m, y_m, z_m              design position of its support of the panels, reflector frame
-    deviation_mm               of the surface there, along the normal, positive towards the focus
-    correction_mm              of its travel: the deviation's opposite
+    deviation_mm               deviation of the surface there, along the normal, positive towards the focus
+    correction_mm              correction of its travel: the deviation's opposite
     steps, left_mm             whole steps of its encoder, and the remaining correction
     position_mm, target_mm     before and after; 0 without a known position
     within_limits              True if the target is

@@ -73,10 +73,10 @@ class PanelScrew(Record):
 class PanelInstrument(Certificate):
     """Complete SHEET.toml.
 
-    name                 of the tool
+    name                 name of the tool
     u_gauge_um           repeatability of one reading, with repositioning
     resolution_um        last digit of a reading
-    travel_mm            of a gauge; a reading beyond half of it is refused
+    travel_mm            range of a gauge; a reading beyond half of it is refused
     u_zero_um            drift of the zero of a gauge within a session
     u_flat_um            of the flat under one gauge
     u_lean_arcsec        of one reading of an inclinometer

@@ -24,8 +24,8 @@ class PanelCorner(Record):
     """Row of the layout: one corner of one panel.
 
     place              1 to 4, in order around the panel, from x to y
-    x_mm, y_mm         of the corner, reflector frame; the same in every row of a corner
-    design_offset_um   of this panel's surface at the corner from the paraboloid, by design
+    x_mm, y_mm         coordinates of the corner in the reflector frame; the same in every row of a corner
+    design_offset_um   design offset of this panel's surface at the corner, from the paraboloid
     panel              name of the panel
     corner             name of the actuator under the corner
     """

@@ -71,20 +71,20 @@ class Laser(Record):
 class BeamElement(Record):
     """[[outward]], [[inward]]: optical element, in the order of the light.
 
-    kind                 space, lens, thick_lens, mirror, plate, aperture, splitter, isolator
-    name                 for tables and figures
-    aperture_radius_mm   of any element: light outside is lost
-    transmission         of any element, without the coating of a mirror
-    length_mm            of a space, in air
-    focal_length_mm      of a thin lens
-    acts                 of a thin lens: "x" or "y" for a cylindrical one
+    kind                 kind of the element
+    name                 label in tables and figures
+    aperture_radius_mm   aperture of any element: light outside is lost
+    transmission         power transmission of any element, without the coating of a mirror
+    length_mm            length of a space, in air
+    focal_length_mm      focal length of a thin lens
+    acts                 axis of a thin lens: "x" or "y" for a cylindrical one
     r1_mm, r2_mm         radii of a thick lens, positive if the centre is behind; flat by default
-    thickness_mm         of a thick lens or a plate
-    glass                of a thick lens or a plate, by its name in `catseye glass`
-    radius_mm            of a mirror, positive if concave; flat by default
-    incidence_deg        on a mirror or a plate
+    thickness_mm         thickness of a thick lens or a plate
+    glass                glass of a thick lens or a plate, by its name in `catseye glass`
+    radius_mm            radius of a mirror, positive if concave; flat by default
+    incidence_deg        angle of incidence on a mirror or a plate
     plane                axis in the plane of incidence
-    coating              of a mirror, by its name in `catseye plot coating`
+    coating              coating of a mirror, by its name in `catseye plot coating`
     turn_deg             rotation by the rotator of an isolator
     leak                 leakage of each polarizer of an isolator
     """
@@ -125,9 +125,9 @@ class BeamElement(Record):
 class ReflectorRecord(Record):
     """[reflector]: a retroreflector, centred in the beam.
 
-    radius_mm     of its clear aperture
-    reflectance   of all its surfaces
-    name          for tables and figures
+    radius_mm     radius of the clear aperture
+    reflectance   total reflectance of all its surfaces
+    name          label in tables and figures
     """
 
     name: str = ""
@@ -138,12 +138,12 @@ class ReflectorRecord(Record):
 class Detector(Record):
     """[detector]: a round photodiode after the last inward element.
 
-    radius_mm              of the active disc
-    offset_um              of the image from the centre of the disc
+    radius_mm              radius of the active disc
+    offset_um              offset of the image from the centre of the disc
     u_offset_um            standard uncertainty of each coordinate of that offset
     spot_um                radius of the image at 1/e^2; by default from the beam
-    sheet_resistance_ohm   per square; gives with capacitance_pf the delay across the disc
-    capacitance_pf         of the disc
+    sheet_resistance_ohm   resistance per square; with capacitance_pf it gives the delay across the disc
+    capacitance_pf         capacitance of the disc
     """
 
     radius_mm: Size
@@ -172,10 +172,10 @@ class Detector(Record):
 class BeamTrain(Certificate):
     """Complete file.
 
-    wavelength_um    of the light in air
-    modulation_hz    of its amplitude
-    distance_m       from the last outward element to the reflector and from it to the first inward one
-    distances_m      for the table of returned power; by default a doubling series around distance_m
+    wavelength_um    wavelength of the light in air
+    modulation_hz    frequency of the amplitude modulation
+    distance_m       distance from the last outward element to the reflector and from it to the first inward one
+    distances_m      distances in the table of returned power; by default a doubling series around distance_m
     name             title of the train
     laser            source
     outward          elements from the laser to the reflector, in order

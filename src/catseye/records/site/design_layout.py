@@ -29,7 +29,7 @@ class PointSet(Record):
     centre_m         x, y, z
     focal_length_m   z rises by r^2 / 4 f above the centre's: a paraboloid; without, all are level
     count            number of points
-    radius_m         of the ring or disc
+    radius_m         radius of the ring or disc
     first_deg        angle of the first point, from x towards y
     """
 
@@ -112,7 +112,7 @@ class DesignRanges(Record):
 class DesignLayout(Certificate):
     """Complete file of a structure to be designed.
 
-    name          of the structure
+    name          name of the structure
     description   title of the report
     ranges        uncertainty and reach of ranges
     rangers       sets of rangers

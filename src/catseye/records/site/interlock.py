@@ -22,7 +22,7 @@ class Interlock(Record):
     daily_from, daily_until  UTC, times of day, over midnight if until is earlier; within begin and end if given
     switch                   instead of times: a contact, open until reported closed
     why                      reason, repeated in refusals
-    name                     of the interlock
+    name                     name of the interlock
     """
 
     name: Name

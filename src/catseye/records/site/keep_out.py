@@ -21,7 +21,7 @@ class KeepOutBox(Record):
     centre_mm, size_mm   alternative to the corners
     turn_deg             rotation about its vertical middle axis, from x towards y
     why                  protected object, repeated in refusals
-    name                 of the box
+    name                 name of the box
     """
 
     name: Name

@@ -46,36 +46,36 @@ class MirrorGeometry(Certificate):
     zp                                 name of the mirror
     laser_number, detector_number      parts of the head
     head_number, oscillator_number     parts of the head
-    leakage_amplitude_volt, leakage_phase_rad  phasor that leaks into every shot
+    leakage_amplitude_volt, leakage_phase_rad  amplitude and phase of the leakage, subtracted from every shot's phasor
     u_leakage_volt                     of each quadrature of the leakage
-    d0_mm                              straight from the scan point to the internal reference cube
+    d0_mm                              straight distance from the scan point to the internal reference cube
     dx_mm, dy_mm, dz_mm                scan point from the Kelvin fixed point, mount's axes
-    u_offset_mm                        of each of these three
+    u_offset_mm                        of each of dx_mm, dy_mm and dz_mm
     beta1_rad, beta2_rad               small rotations of the mirror's axes about x and y of the mount
-    u_beta_rad                         of each of these two
+    u_beta_rad                         of each of beta1_rad and beta2_rad
     axis_offset_mm                     elevation axis from the azimuth axis, positive along the azimuth of the beam
     mirror_offset_mm                   reflecting face from the elevation axis, positive along its outward normal
     beam_x_mm, beam_y_mm               laser beam from the azimuth axis where it meets the mirror, mirror's axes at
                                        Theta = 0
-    u_axis_mm                          of each of these four
-    face_tilt_rad                      of the face's outward normal from the plane across the elevation axis,
+    u_axis_mm                          of each of axis_offset_mm, mirror_offset_mm, beam_x_mm and beam_y_mm
+    face_tilt_rad                      tilt of the face's outward normal from the plane across the elevation axis,
                                        towards the axis's y end (y of the mirror's axes at Theta = 0)
     beam_tilt_x_rad, beam_tilt_y_rad   x and y of the direction opposite to the incoming laser beam; z is nearly 1
-    u_tilt_rad                         of each of these three
-    detector_defocus_mm                of the detector, for the record
-    beam_divergence_rad                of the beam, for the record
+    u_tilt_rad                         of each of face_tilt_rad, beam_tilt_x_rad and beam_tilt_y_rad
+    detector_defocus_mm                defocus of the detector, for information only
+    beam_divergence_rad                divergence of the beam, for information only
     amplitude_to_phase_rad             increase of the measured phase per factor e of amplitude above that of the
                                        reference shots
-    cyclic_cosine_mm, cyclic_sine_mm   of the range error (too long), orders 1, 2, ... of the phase after the
-                                       electronics'
-    u_cyclic_mm                        of each of these terms; alone it means orders 1 and 2, expected zero
+    cyclic_cosine_mm, cyclic_sine_mm   terms of the range error (positive: too long), orders 1, 2, ... of the phase
+                                       after the electronics'
+    u_cyclic_mm                        of each cyclic term; without terms it stands for orders 1 and 2, expected zero
     na0, ne0                           encoder counts of azimuth and elevation at zero
-    u_zero_counts                      of each of these two
+    u_zero_counts                      of each of `na0` and `ne0`
     azimuth_encoder_cosine_counts, azimuth_encoder_sine_counts  orders 1, 2, ... of the encoder's error, positive if
                                        it reads too high: waves of the axis's angle from its zero
     elevation_encoder_cosine_counts, elevation_encoder_sine_counts  the same of the elevation encoder, in the
                                        mirror's own angle, half of Phi
-    u_encoder_counts                   of each of these terms
+    u_encoder_counts                   of each term of both encoders' errors
     az_low_limit, az_high_limit        counts of the azimuth stops, both allowed
     azm_zrg, elv_zrg                   counts that point at the internal cube
     abv_0, abv_1                       greatest velocity of axis 0 (azimuth) and 1 (elevation), integers of the
@@ -88,28 +88,6 @@ class MirrorGeometry(Certificate):
     fsi_0, fsi_1                       interval of the derivative, samples
     erl_0, erl_1                       greatest following error, counts
     notes                              NOTES of the report
-
-    dx_mm, dy_mm, dz_mm scan point from the Kelvin fixed point, mount's axes, with u_offset_mm each
-    beta1_rad, beta2_rad  small rotations about x and y, with u_beta_rad each
-    na0, ne0            encoder counts at zero, with u_zero_counts each
-    az_low_limit, az_high_limit  counts, both allowed
-    axis_offset_mm      elevation axis from the azimuth axis, positive along the azimuth of the beam
-    mirror_offset_mm    reflecting face from the elevation axis, positive along its outward normal
-    beam_x_mm, beam_y_mm  laser beam from the azimuth axis where it meets the mirror, mirror's axes at Theta = 0
-    u_axis_mm           of each of these four
-    face_tilt_rad       of the face's outward normal from the plane across the elevation axis, towards the axis's y end
-                        (y of the mirror's axes at Theta = 0)
-    beam_tilt_x_rad, beam_tilt_y_rad  x and y of the direction opposite to the incoming laser beam; z is nearly 1
-    u_tilt_rad          of each of these three
-    azimuth_encoder_cosine_counts, ..._sine_counts, elevation_encoder_...  orders 1, 2, ... of the encoder's
-                        error, positive if it reads too high: waves of the axis's angle from its zero; with
-                        u_encoder_counts of each
-    laser_number, detector_number, head_number, oscillator_number  parts of the head
-    abv_0, aba_0        velocity and acceleration of axis 0 (azimuth), integers of the motion chip: counts a sample
-                        (a sample) times 65 536; fkp_0, fki_0, fkd_0, fil_0, fsi_0 its filter; erl_0 in counts; _1 is
-                        elevation
-    detector_defocus_mm, beam_divergence_rad  with u_ of each: of the optics, for the record
-    notes               NOTES of the report
     """
 
     format: Annotated[int | str, Version("mirror")] = 1
@@ -219,12 +197,12 @@ class MirrorGeometry(Certificate):
 class Mirror(MirrorGeometry):
     """Laser head with its mirror, complete for ranging; other keys are in `MirrorGeometry`.
 
-    leakage_amplitude_volt, leakage_phase_rad, u_leakage_volt   the phasor that leaks into every shot
-    d0_mm               straight from the scan point to the internal reference cube, with u_d0_mm
+    leakage_amplitude_volt, leakage_phase_rad  amplitude and phase of the leakage, subtracted from every shot's phasor
+    d0_mm               straight distance from the scan point to the internal reference cube, with u_d0_mm
     amplitude_to_phase_rad  increase of the measured phase per factor e of amplitude above that of the reference
                         shots, with u_amplitude_to_phase_rad
-    cyclic_cosine_mm, cyclic_sine_mm  of the range error (too long), orders 1, 2, ... of the phase after the
-                        electronics', with u_cyclic_mm of each; u_cyclic_mm alone means orders 1 and 2, expected zero
+    cyclic_cosine_mm, cyclic_sine_mm  terms of the range error (positive: too long), orders 1, 2, ... of the phase after
+                        the electronics', with u_cyclic_mm of each; without terms it stands for orders 1 and 2
     azm_zrg, elv_zrg    counts that point at the cube
 
     The scan point is where the axes should meet: on the azimuth axis, nearest to the elevation axis. D0 is a distance

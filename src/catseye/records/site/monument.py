@@ -32,15 +32,15 @@ class MonumentGeometry(Certificate):
 
     monument                 the ranger's name
     zp                       name of its mirror
-    control_panel, ethernet_address, ip_address  of the ranger's cabinet
+    control_panel, ethernet_address, ip_address  identification of the ranger's cabinet
     x_mm, y_mm, z_mm         Kelvin fixed point, ground frame
     u_x_mm, u_y_mm, u_z_mm   of each coordinate; 0: held fixed
     azimuth_deg              survey azimuth, clockwise from north, of the line from fixed point to v-block
     alpha1_rad               pi - azimuth, about y^
     alpha2_rad               about z^, positive: x^ rises
     alpha3_rad               about x^, positive: z^ (the v-block) sinks
-    latitude_deg             of the monument, NAD83
-    longitude_deg            of the monument, NAD83, east positive
+    latitude_deg             latitude of the monument, NAD83
+    longitude_deg            longitude of the monument, NAD83, east positive
     elevation_m              above sea level
     wv_x_m, wv_y_m           West Virginia South state plane (NAD83): easting, northing
     wv_z_m                   elevation of the monument by the survey

@@ -25,11 +25,11 @@ class PointingModel(Certificate):
     """Complete file of a pointing series.
 
     terms               unique names of the coefficients
-    values_arcsec       in the same order
+    values_arcsec       values of the terms, in the same order
     covariance_arcsec2  rows in the same order; none if unknown
-    sky_rms_arcsec      of the fit, if any
-    verdict, why        of the fit if not good, and then of predictions
-    name                of the series
+    sky_rms_arcsec      rms residual of the fit on the sky, if any
+    verdict, why        verdict of the fit if not good, and then of predictions
+    name                name of the series
     """
 
     format: Literal["catseye-pointing-series-1"]
@@ -71,7 +71,7 @@ class NamedSeries:
     """Pointing series with its origin.
 
     name      "published", or the model's file or name
-    verdict   of the fit; None where unknown
+    verdict   verdict of the fit; None where unknown
     hashes    SHA-256 of the file by its name; none without a file
     """
 

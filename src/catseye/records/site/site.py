@@ -28,10 +28,10 @@ PositiveMillimetres = Annotated[float, Within(500, 1e6)]
 class PostureRecord(Record):
     """[campaign]: time and position of the telescope.
 
-    name            of the campaign, or of the site
+    name            name of the campaign, or of the site
     start_mjd_utc   time of the start
-    azimuth_deg     of the telescope, clockwise from north
-    elevation_deg   of the telescope
+    azimuth_deg     azimuth of the telescope, clockwise from north
+    elevation_deg   elevation of the telescope
     """
 
     name: str = Field(min_length=1)
@@ -43,8 +43,8 @@ class PostureRecord(Record):
 class Location(Record):
     """[site]: longitude east positive; elevation of the ground frame's z = 0 above sea level.
 
-    latitude_deg        of the pintle bearing, north positive
-    longitude_deg       of the pintle bearing, east positive
+    latitude_deg        latitude of the pintle bearing, north positive
+    longitude_deg       longitude of the pintle bearing, east positive
     elevation_of_z0_m   of the ground frame's z = 0 above sea level
     """
 
@@ -89,9 +89,9 @@ class Frames(Record):
 class ParaboloidRecord(Record):
     """[paraboloid]: the design surface; its aperture in the reflector frame's x and y.
 
-    focal_length_mm      of the parent paraboloid
+    focal_length_mm      focal length of the parent paraboloid
     aperture_centre_mm   x, y of the middle of the aperture
-    aperture_radius_mm   of the aperture
+    aperture_radius_mm   radius of the aperture
     """
 
     focal_length_mm: PositiveMillimetres
@@ -104,7 +104,7 @@ class Ranging(Record):
 
     modulation_hz                  frequency of the modulation
     if_hz                          intermediate frequency of the samples
-    wavelength_um                  of the light in vacuum
+    wavelength_um                  wavelength of the light in vacuum
     bk7_to_air_group_index_ratio   group index of BK 7 over that of air
     bk7_to_air_phase_index_ratio   refracts oblique light, if given; else the group index, as in appendix B of the
                                    triplet memo (0.4 um at 30 degrees)
@@ -124,10 +124,10 @@ class Ranging(Record):
 class Adc(Record):
     """[adc]: the converter; code 32768 corresponds to full_scale_volt.
 
-    bits                of the converter
+    bits                resolution of the converter
     full_scale_volt     voltage of code 32768
     samples_per_cycle   samples in a cycle of the intermediate frequency
-    cycles              of a buffer
+    cycles              number of cycles in a buffer
     """
 
     bits: Annotated[int, Within(8, 16)]
@@ -146,8 +146,8 @@ class WeatherStation(Record):
     """[[weather_station]]: elevation above sea level, place in ground frame.
 
     x_m, y_m   east and north of the pintle bearing; unknown if missing
-    name       of the station
-    elevation_m  of its sensors above sea level
+    name       name of the station
+    elevation_m  elevation of its sensors above sea level
     """
 
     name: Name
@@ -159,9 +159,9 @@ class WeatherStation(Record):
 class InCommon(Record):
     """[in_common]: uncertainties common to records of one kind, as consider parameters.
 
-    certificate_scale_ppm   of the benchmarks' certificates, by one laboratory; 0: independent errors, by each one's u
-    survey_scale_ppm        of the monuments, by one survey; likewise
-    glass_index_ratio       of bk7_to_air_group_index_ratio
+    certificate_scale_ppm   scale error (1σ) of all benchmark certificates of one laboratory; 0: errors are independent
+    survey_scale_ppm        scale error (1σ) of all monuments of one survey; likewise
+    glass_index_ratio       common error (1σ) of bk7_to_air_group_index_ratio
     sheets_at_c             calibration temperature of heads and prisms; if given, the expansion of steel and glass to
                             the campaign's is uncertain in common; else it is covered by their own u
     """

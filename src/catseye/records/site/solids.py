@@ -35,7 +35,7 @@ Thickness = Annotated[float, Within(0, 1e4)]  # mm
 class SolidRecord(Record):
     """Keys of all kinds: a name and a frame.
 
-    name    of the solid
+    name    name of the solid
     frame   frame of its coordinates, with which it moves
     """
 
@@ -52,7 +52,7 @@ class BoxRecord(SolidRecord):
 
     centre_mm   middle of the box
     size_mm     full lengths along its x, y and z
-    turn_deg    of its x axis about the z of the frame, right-handed
+    turn_deg    rotation of its x axis about the z of the frame, right-handed
     """
 
     centre_mm: Vector
@@ -126,9 +126,9 @@ class ConeRecord(SolidRecord):
 class DishRecord(SolidRecord):
     """[[dish]]: piece of the paraboloid z = (x^2 + y^2)/4f about the frame's z axis, vertex at its origin.
 
-    focal_length_mm      of the paraboloid
+    focal_length_mm      focal length of the paraboloid
     aperture_centre_mm   x, y of the middle of its aperture
-    aperture_radius_mm   of the aperture
+    aperture_radius_mm   radius of the aperture
     below_mm, above_mm   thickness along z, below and above the surface
     """
 

@@ -100,12 +100,12 @@ class Basis(Record):
 class MotionRecord(Basis):
     """Shift and rotation of a frame or group in its nominal axes; missing components are zero.
 
-    pivot_mm        in these axes
+    pivot_mm        point about which the frame rotates, in its own axes
     u_shift_mm      standard uncertainty of each shift in any one posture, independent each time: the model's residual
     u_turn_arcsec   of each rotation
-    covariance      of all coefficients, mm and arc seconds, component by component in the order of the keys; 6 k rows
+    covariance      covariance of all coefficients, mm and arc seconds, component by component as the keys; 6 k rows
     shift_x_mm, shift_y_mm, shift_z_mm  coefficients of the shift along each axis, or its values at the knots
-    turn_x_arcsec, turn_y_arcsec, turn_z_arcsec  of the rotation about each axis, likewise
+    turn_x_arcsec, turn_y_arcsec, turn_z_arcsec  component of the rotation about each axis, likewise
     """
 
     pivot_mm: Place
@@ -138,8 +138,8 @@ class FrameRecord(Record):
 
     parent      frame that carries it
     origin_mm   origin in the parent's axes
-    name        of the frame
-    motion      of the frame; at rest without
+    name        name of the frame
+    motion      motion of the frame; at rest without
     """
 
     name: Name
@@ -151,8 +151,8 @@ class FrameRecord(Record):
 class PointRecord(Record):
     """Point of a group, in the frame of the group; shifts by the group's basis.
 
-    name                                 of the point
-    position_mm                          in the nominal posture
+    name                                 name of the point
+    position_mm                          position in the nominal posture
     u_position_mm                        of each coordinate
     shift_x_mm, shift_y_mm, shift_z_mm   coefficients or values of its own shift
     """
@@ -169,10 +169,10 @@ class GroupRecord(Record):
     """Points that move together, or each by its own table.
 
     frame        frame of their coordinates
-    motion       of all of them, in addition to the frame's
+    motion       motion of all of them, in addition to the frame's
     shifts       functions of posture with values in each point
     u_shift_mm   residual u of each coordinate in any one posture; with `shifts` only
-    name         of the group
+    name         name of the group
     point        points of the group
     """
 
@@ -204,10 +204,10 @@ class VibrationRecord(Record):
     """Vibration mode of a frame, and its effect on the quadrant detector.
 
     frame                moved frame; rotations are about the pivot of its motion
-    frequency_hz, u_frequency_hz, damping_ratio   of the mode
+    frequency_hz, u_frequency_hz, damping_ratio   frequency and damping ratio of the mode
     shift_per_x, shift_per_y                      m of shift per metre on the detector in x, in y
     turn_arcsec_per_mm_x, turn_arcsec_per_mm_y    rotation likewise
-    name                 of the mode
+    name                 name of the mode
     """
 
     name: Name
@@ -224,7 +224,7 @@ class VibrationRecord(Record):
 class StructuralModel(Certificate):
     """Complete structural model; outside its ranges refused, not extrapolated.
 
-    title                     of the model
+    title                     title of the model
     elevation_deg             least and greatest elevation for which it holds
     temperature_c             least and greatest temperature for which it holds
     reference_temperature_c   temperature at which the thermal terms are zero

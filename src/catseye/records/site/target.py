@@ -21,15 +21,15 @@ PositionUncertainty = Annotated[float, Within(0, 1000, above=True)]  # mm, each 
 class TargetRow(Record):
     """Single retroreflector; its kind says which keys it has.
 
-    name                     of the target, each once
+    name                     name of the target, each once
     type                     kind of retroreflector
     frame                    frame of its position, with which it moves
     position_mm              approximate, in the named frame
     u_position_mm            of each coordinate; by default the reduction's setting, 10 mm
     normal                   outward axis, same frame, of a kind that has one: normal of a prism's entry face
-    material                 of a prism
-    height_mm, u_height_mm   of a prism, from the corner to the entry face
-    hrp_mm                   from the entry face of a prism down to the reference point
+    material                 material of a prism
+    height_mm, u_height_mm   height of a prism, from the corner to the entry face
+    hrp_mm                   depth from the entry face of a prism down to the reference point
     pc_mm                    prism constant, negative
     """
 
@@ -86,7 +86,7 @@ class FeedArmRanger(Record):
 
     u_position_mm   of each coordinate of the scan point; by default the reduction's setting, 10 mm
     mount_z, mount_y  directions of the mount's z^ (fixed point to v-block) and y^ (up), reflector frame; both or none
-    name            of the ranger
+    name            name of the ranger
     zp              name of its mirror
     nominal_scan_point_mm  nominal position of the scan point
     """

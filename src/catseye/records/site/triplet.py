@@ -34,8 +34,8 @@ class TripletPrism(Record):
 
     target      name of the prism as a target
     serial      serial number
-    height_mm   of the prism, from the corner to the entry face
-    hrp_mm      from the entry face down to the reference point
+    height_mm   height of the prism, from the corner to the entry face
+    hrp_mm      depth from the entry face down to the reference point
     pc_mm       prism constant, negative
     """
 
@@ -90,9 +90,9 @@ class TripletRecord(Certificate):
 
     nominal_position_mm     approximate centre of the ball, in the named frame
     u_position_mm           of each coordinate; by default the reduction's setting, 10 mm
-    normal                  of the top plate, towards the prism side
+    normal                  normal of the top plate, towards the prism side
     axis                    unit vector from the left to the right prism
-    d12_mm                  between the prisms, with u_d12_mm
+    d12_mm                  distance between the prisms' reference points, with u_d12_mm
     h_corr_mm               ball centre above the prisms' midpoint along normal, with u_h_corr_mm
     l_mpbc_mm               the same from the surface plate, with u_l_mpbc_mm
     u_lateral_mm            ball centre against the midpoint, each direction in the plate

@@ -69,8 +69,8 @@ def _item(token: str, tokens: Iterator[str]) -> str:
     if name in SPACES:
         return SPACES[name]
     if name in ("frac", "tfrac", "dfrac"):
-        over, under = _argument(tokens), _argument(tokens)
-        return f"{_grouped(over)}/{_grouped(under)}"
+        numerator, denominator = _argument(tokens), _argument(tokens)
+        return f"{_grouped(numerator)}/{_grouped(denominator)}"
     if name == "sqrt":
         return f"√{_grouped(_argument(tokens))}"
     if name in ACCENTS:

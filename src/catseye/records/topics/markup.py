@@ -120,8 +120,8 @@ def _rendered(directive: Directive) -> list[str]:
             return render(directive)
     if kind.startswith(("grid", "tab-", "card", "dropdown")) or kind in ("div", "container", "margin", "topic"):
         page = directive.options.get("link", "").removesuffix("/index")
-        there = f" (`catseye help {page}`)" if page and directive.options.get("link-type") == "doc" else ""
-        title = [f"**{directive.argument}**{there}", ""] if re.search(r"[A-Za-z]", directive.argument) else []
+        command = f" (`catseye help {page}`)" if page and directive.options.get("link-type") == "doc" else ""
+        title = [f"**{directive.argument}**{command}", ""] if re.search(r"[A-Za-z]", directive.argument) else []
         return ["", *title, *_lines(directive.body), ""]
     return ["", f"{BUILT}: {f'{kind} {directive.argument}'.strip()})*", ""]
 

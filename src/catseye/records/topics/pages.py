@@ -44,8 +44,8 @@ class Topic:
         inside = "" if self.name == "index" else self.name
         folder = inside if f"{self.name}/index" in _files() else posixpath.dirname(self.name)
         linked = [topic_name(posixpath.normpath(posixpath.join(folder, page))) for page in linked_pages(self.source)]
-        under = [name for name in names if posixpath.dirname(name) == inside]
-        return tuple(name for name in dict.fromkeys([*linked, *under]) if name in names and name != self.name)
+        children = [name for name in names if posixpath.dirname(name) == inside]
+        return tuple(name for name in dict.fromkeys([*linked, *children]) if name in names and name != self.name)
 
     def to_object(self) -> dict[str, object]:
         """Topic as an object for JSON."""
@@ -119,13 +119,13 @@ def read_topic(name: str) -> Topic:
     name   "conventions", "formats/beam", or the last part alone where only one topic ends so
     """
     files = {topic_name(page): path for page, path in _files().items()}
-    wanted = topic_name(name.strip("/").removeprefix("docs/").lower())
-    full = [wanted] if wanted in files else [each for each in files if each.rpartition("/")[2] == wanted]
+    key = topic_name(name.strip("/").removeprefix("docs/").lower())
+    full = [key] if key in files else [topic for topic in files if topic.rpartition("/")[2] == key]
     if len(full) == 1:
         return Topic(full[0], _source(files[full[0]]))
     if full:
         raise InputError(f"topic {shown(name)} is not unique (expected {' or '.join(sorted(full))})")
-    near = _near(wanted, sorted(files))
+    near = _near(key, sorted(files))
     advice = f"did you mean {' or '.join(near)}? " if near else ""
     raise InputError(f"topic {shown(name)} not found ({advice}catseye help lists all topics)")
 
@@ -133,8 +133,8 @@ def read_topic(name: str) -> Topic:
 def _near(name: str, names: list[str]) -> list[str]:
     """Topics whose names, or whose last parts, are like a name; or hold it."""
     ends: dict[str, list[str]] = {}
-    for each in names:
-        ends.setdefault(each.rpartition("/")[2], []).append(each)
+    for topic in names:
+        ends.setdefault(topic.rpartition("/")[2], []).append(topic)
     words = get_close_matches(name.rpartition("/")[2], list(ends), NEAR, LIKENESS)
-    near = [*get_close_matches(name, names, NEAR, LIKENESS), *(each for word in words for each in ends[word])]
-    return list(dict.fromkeys([*near, *(each for each in names if len(name) > 2 and name in each)]))[:NEAR]
+    near = [*get_close_matches(name, names, NEAR, LIKENESS), *(topic for word in words for topic in ends[word])]
+    return list(dict.fromkeys([*near, *(topic for topic in names if len(name) > 2 and name in topic)]))[:NEAR]

@@ -51,7 +51,7 @@ class PathSheet(Certificate):
     u_path_length_mm                     of the length; 25 mm suffice for changes, the absolute index needs
                                          micrometres
     modulation_hz                        frequency of the modulation
-    wavelength_um                        of the light in vacuum
+    wavelength_um                        wavelength of the light in vacuum
     air_model                            formula for the index of air
     co2_ppm                              carbon dioxide in the air
     u_temperature_c                      of each thermometer's offset, common to all its readings; a list has one

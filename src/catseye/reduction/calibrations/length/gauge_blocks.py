@@ -42,7 +42,7 @@ Coefficient = Annotated[float, Within(-5, 50)]
 class Block(Record):
     """Gauge block: name in the table, certified length at 20 °C, u.
 
-    name        as in the table
+    name        name of the block, as in the table
     length_mm   certified length at 20 °C
     u_mm        standard uncertainty of the length
     """
@@ -55,8 +55,8 @@ class Block(Record):
 class LengthSheet(Sheet):
     """Common keys of both kinds' sheets.
 
-    expansion_ppm_per_c, u_expansion_ppm_per_c  of blocks or spacers: 11.5 for steel
-    temperature_c     of blocks or spacers; a column where it changed
+    expansion_ppm_per_c, u_expansion_ppm_per_c  coefficient of expansion of blocks or spacers: 11.5 for steel
+    temperature_c     temperature of blocks or spacers; a column where it changed
     u_temperature_c   of the thermometer's offset, common to all readings
     u_reading_mm      scatter of a reading, if known
     """
@@ -95,7 +95,8 @@ class SpacersSheet(LengthSheet):
 
     true = (reads - zero) / (1 + scale).
 
-    zero_mm, u_zero_mm, scale_ppm, u_scale_ppm   of the instrument, from its own calibration
+    zero_mm, u_zero_mm       zero of the instrument, from its own calibration
+    scale_ppm, u_scale_ppm   scale error of the instrument, from its own calibration
     """
 
     zero_mm: Annotated[float, Within(-100, 100)] = 0.0

@@ -54,8 +54,8 @@ SHARED = 13  # parameters before those of the set-ups
 class HeightSheet(Sheet):
     """Sheet of offsets by a height gauge.
 
-    ball_diameter_mm, u_ball_diameter_mm  of the tooling ball; needed where tops or bottoms are touched
-    mirror_diameter_mm, u_mirror_diameter_mm  of a journal or plug gauge on the mirror's axes, likewise
+    ball_diameter_mm, u_ball_diameter_mm  diameter of the tooling ball; needed where tops or bottoms are touched
+    mirror_diameter_mm, u_mirror_diameter_mm  diameter of a journal or plug gauge on the mirror's axes, likewise
     block                                 gauge blocks under the indicator, as for gauge-blocks
     film_um, u_film_um                    thickness of each film between blocks
     u_lean_arcsec                         of what it stands on, towards the front and the right: the same in all
@@ -64,7 +64,8 @@ class HeightSheet(Sheet):
     u_scale_ppm                           of the height gauge
     gauge_temperature_c                   temperature of the gauge's scale and the blocks, which are true at 20 °C
     gauge_expansion_ppm_per_c             their coefficient of expansion
-    dx_mm, dy_mm, dz_mm, u_offset_mm      of an offset whose axis never looks up; it is fixed then
+    dx_mm, dy_mm, dz_mm                   offset along an axis that never points up: known beforehand and held
+    u_offset_mm                           of each such offset
     u_reading_mm                          scatter of a reading, if known
     """
 

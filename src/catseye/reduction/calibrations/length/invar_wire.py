@@ -64,12 +64,12 @@ class WireSheet(Sheet):
     certified_mm, u_certified_mm       length between its marks at 20 °C
     certified_tension_n                tension at its calibration
     hanging                            true if it was certified hanging (chord), false if supported
-    weight_n_per_m, u_weight_n_per_m   of the wire
+    weight_n_per_m, u_weight_n_per_m   weight per length of the wire
     stiffness_n, u_stiffness_n         modulus of elasticity times area
-    expansion_ppm_per_c, u_expansion_ppm_per_c  of the wire
-    tension_n, u_tension_n             of the use; a column where it changed
-    temperature_c, u_temperature_c     of the wire in use, likewise
-    height_difference_mm, u_height_difference_mm  between the ends, likewise
+    expansion_ppm_per_c, u_expansion_ppm_per_c  coefficient of expansion of the wire
+    tension_n, u_tension_n             tension in use; a column where it changed
+    temperature_c, u_temperature_c     temperature of the wire in use, likewise
+    height_difference_mm, u_height_difference_mm  height difference between the ends, likewise
     scale_sum_mm, u_scale_sum_mm       addition of the end scales to the chord; usually a column
     known_distance_mm, u_known_distance_mm  if given, the wire is calibrated instead
     u_reading_mm                       scatter of a reading, if known

@@ -54,7 +54,7 @@ class AlignmentSheet(Sheet):
     u_spot_mm             scatter of each coordinate of a spot, if known
     u_screen_turn_deg     of each screen about the beam, against p and q
     u_path_mm             of each screen's path_m
-    face_tilt_rad, u_face_tilt_rad   of the mirror against its elevation shaft, from an autocollimation, for the effect
+    face_tilt_rad, u_face_tilt_rad   face tilt against the elevation shaft, by autocollimation; for the effect
     effect_phi_deg, effect_distance_m   directions of the reported effect on range and pointing ([30, 60, 90, 120], 100)
     """
 

@@ -53,7 +53,8 @@ class PointingSheet(Sheet):
     """Sheet of counts in both pointings.
 
     na0_nominal, ne0_nominal   counts: good to a few hundred, start of the search
-    axis_offset_mm, mirror_offset_mm, beam_x_mm, beam_y_mm, u_axis_mm   of the mirror (0, 0)
+    axis_offset_mm, mirror_offset_mm, beam_x_mm, beam_y_mm   as in the mirror's record (0)
+    u_axis_mm              of each of these offsets (0)
     u_axis_tilt_arcsec     elevation shaft against the plane across the azimuth axis
     u_direction_arcsec     of each target's theta_deg and phi_deg, if these columns are there
     u_frame_arcsec         of the frame of these directions against the mirror's axes, about x and y: u of beta

@@ -51,11 +51,11 @@ class FocusSheet(Sheet):
 
     model                  "gaussian_beam" or "curve"
     fill                   2 (radius of the detector over the spot's waist) squared, of the Gaussian beam; 0 if small
-    degree                 of the curve: 2, 3 or 4 (4)
-    installed_mm, u_installed_mm   of the fixed detector, in the column's scale
+    degree                 degree of the curve: 2, 3 or 4 (4)
+    installed_mm, u_installed_mm   position of the fixed detector, in the column's scale
     u_amplitude_share      relative scatter of an amplitude, if known
-    amplitude_to_phase_rad, u_amplitude_to_phase_rad   of the mirror's record, for the effect on range
-    half_wavelength_mm     of the modulation in air (99.93)
+    amplitude_to_phase_rad, u_amplitude_to_phase_rad   coefficient of the mirror's record; for the effect on range
+    half_wavelength_mm     half wavelength of the modulation in air (99.93)
     """
 
     model: Literal["gaussian_beam", "curve"] = "gaussian_beam"

@@ -35,7 +35,7 @@ WIDE = 3.0  # standard deviations of a single touch, within the limit
 class LimitsSheet(Sheet):
     """Sheet of the stops.
 
-    margin_counts   by which the limits stand inside of the stops
+    margin_counts   distance of the limits inside the stops
     u_touch_counts  scatter of a touch, if known
     na0             counts at Theta = 0, if known: then the directions out of reach are named
     """

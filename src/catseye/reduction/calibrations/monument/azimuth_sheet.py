@@ -17,7 +17,7 @@ ULength = Annotated[float, Within(0, 1e4)]  # mm
 class Reference(Record):
     """Target with a known direction from the v-block.
 
-    name               of the target
+    name               name of the target
     v_block_deg        direction of the v-block, clockwise from the target
     u_v_block_arcsec   of that direction
 
@@ -32,7 +32,7 @@ class Reference(Record):
 class KnownPoint(Record):
     """Target with coordinates in the ground frame and their u.
 
-    name               of the target
+    name               name of the target
     x_mm, y_mm, z_mm   coordinates
     """
 
@@ -48,7 +48,7 @@ class KnownPoint(Record):
 class CataloguedStar(Record):
     """Star, ICRS at J2000.0.
 
-    name                   of the star
+    name                   name of the star
     ra_deg                 right ascension
     dec_deg                declination
     motion_ra_mas          motion in right ascension times cos(declination), a year
@@ -71,21 +71,21 @@ class CataloguedStar(Record):
 class AzimuthSheet(MonumentSheet):
     """Sheet of directions on a Kelvin mount.
 
-    u_x_mm, u_y_mm, u_z_mm          of the fixed point
-    covariance_mm2                  of fixed point and points, x y z each in the order of the sheet, instead of all u
-    alpha2_rad, alpha3_rad          of the mount, if known: they carry the instrument's offset
+    covariance_mm2                  covariance of fixed point and points, x y z each, in order; replaces all u
+    alpha2_rad, alpha3_rad          tilts of the mount, if known: they carry the instrument's offset
     instrument_dx_mm, instrument_dy_mm, instrument_dz_mm  from the fixed point to where the instrument's axes meet,
                                     mount axes
-    u_instrument_mm                 of each
+    u_instrument_mm                 of each coordinate of that offset
     plate_zero_deg, u_plate_zero_arcsec   what the circle reads towards the v-block, if that was calibrated
     u_transport_arcsec              change of the circle against the mount between the lab before and after
     u_direction_arcsec              of one pointing and reading, if known
     u_collimation_arcsec, u_trunnion_arcsec   of the instrument; both faces take them out
-    lean_x_arcsec, lean_z_arcsec    of the top of the vertical axis towards x^ and z^ in the field, by the plate level
-    u_lean_arcsec                   of each
+    lean_x_arcsec, lean_z_arcsec    lean of the vertical axis's top towards x^ and z^ in the field, by plate level
+    u_lean_arcsec                   of each component of the lean
     ut1_utc_s, u_ut1_utc_s          UT1 - UTC; below 0.9 s in size, so that not knowing it is u = 0.52 s
     u_clock_s                       of the times, all together
-    pole_x_arcsec, pole_y_arcsec, u_pole_arcsec   of the Earth's rotation; below 0.6" in size
+    pole_x_arcsec, pole_y_arcsec    coordinates of the Earth's pole; below 0.6" in size
+    u_pole_arcsec                   of each coordinate of the pole
     reference, point, star          tables [[reference]], [[point]], [[star]]; Polaris is known
     """
 

@@ -18,13 +18,13 @@ Longitude = Annotated[float, Within(-180, 180)]
 class FrameSheet(Sheet):
     """Sheet of a calibration in the ground frame.
 
-    origin_latitude_deg     of the pintle bearing, NAD83
-    origin_longitude_deg    of the pintle bearing, NAD83, east positive
+    origin_latitude_deg     latitude of the pintle bearing, NAD83
+    origin_longitude_deg    longitude of the pintle bearing, NAD83, east positive
     origin_elevation_m      NAVD88, of z = 0 below or above the pintle
-    geoid_height_m          of the geoid above the ellipsoid there
+    geoid_height_m          height of the geoid above the ellipsoid there
     xi_arcsec, eta_arcsec   deflection of the vertical: a level's zenith lies xi north and eta east of the
                             ellipsoid's normal
-    u_deflection_arcsec     of each of these two
+    u_deflection_arcsec     of each of xi_arcsec and eta_arcsec
     z_is_plumb              the frame's z is the plumb line at the origin, not the normal
     """
 
@@ -43,7 +43,8 @@ class MonumentSheet(FrameSheet):
 
     In the ground frame.
 
-    x_mm, y_mm, z_mm   of the fixed point
+    x_mm, y_mm, z_mm         coordinates of the fixed point
+    u_x_mm, u_y_mm, u_z_mm   of each coordinate
     """
 
     x_mm: Coordinate

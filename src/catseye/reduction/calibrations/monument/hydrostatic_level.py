@@ -54,7 +54,7 @@ class LevelSheet(Sheet):
 
     held, held_height_mm, u_held_height_mm   the mark whose height is known, as it is called in the table
     constant_mm, u_constant_mm               the instrument's constant, where it is known beforehand
-    depth_m                                  of the tube below the water at both ends; a column where it changed
+    depth_m                                  depth of the tube below the water at both ends; a column where it changed
     u_temperature_c                          of the difference between both vessels' thermometers, all readings together
     u_tube_c                                 of the difference between both drops of the tube, each set-up by itself
     u_scale_ppm                              of the micrometers

@@ -32,9 +32,9 @@ class AirSheet(Sheet):
     """Sheet of readings taken through air.
 
     modulation_hz, u_modulation_ppm        frequency of the modulation, and its standard uncertainty
-    wavelength_um                          of the ranger's light in vacuum
+    wavelength_um                          wavelength of the ranger's light in vacuum
     air_model                              formula for the index
-    temperature_c, pressure_hpa, humidity_percent   of all readings; a column where they changed
+    temperature_c, pressure_hpa, humidity_percent   air of all readings; columns where it changed
     u_temperature_c, ...                   of the sensor: an offset that all readings share
     """
 

@@ -36,11 +36,11 @@ LINE_LEVEL = 0.05  # of the test of a further, quadratic term
 class AmplitudeSheet(Sheet):
     """Sheet of a calibration of the coupling from amplitude to phase.
 
-    reference_amplitude_volt        where nothing is added: the return of the internal cube
+    reference_amplitude_volt        amplitude to which the correction refers: the return of the internal cube
     u_phasor_volt                   of each quadrature of one phasor, if known: u of phase is this over the amplitude
     u_phase_rad                     of each phase, less the reference's where given, instead; a column where they differ
     u_leakage_volt                  of each quadrature of the leakage that was taken out
-    random_walk_rad_per_sqrt_hour   of the electronics, where no reference phases are given; needs mjd_utc
+    random_walk_rad_per_sqrt_hour   random walk of the electronics, where no reference phases are given; needs mjd_utc
     quadratic                       a term in the square of the logarithm is sought too
     """
 

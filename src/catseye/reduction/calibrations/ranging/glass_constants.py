@@ -47,8 +47,8 @@ class GlassSheet(Sheet):
     """Sheet of a target's dimensions.
 
     index_ratio, u_index_ratio   group index of the glass over that of the air: 1.527077 for old BK 7 at 0.780 µm
-    expansion_ppm_per_c, u_expansion_ppm_per_c   of the glass: 7.1 for BK 7
-    temperature_c, u_temperature_c   of the glass; a column where it changed
+    expansion_ppm_per_c, u_expansion_ppm_per_c   coefficient of expansion of the glass: 7.1 for BK 7
+    temperature_c, u_temperature_c   temperature of the glass; a column where it changed
     u_gauge_mm                   of the gauge, an offset that all readings share
     u_reading_mm                 scatter of a reading, if known
     """

@@ -42,8 +42,8 @@ class LitLeakageSheet(Sheet):
 
     u_volt           of each quadrature of one phasor, if known
     modulation_hz    frequency of the modulation
-    group_index      of the air; needed for the column distance_m
-    u_session_volt   by which the leakage differs from session to session, each quadrature
+    group_index      group index of the air; needed for the column distance_m
+    u_session_volt   of the leakage from session to session, each quadrature
     """
 
     u_volt: Annotated[float, Within(0, 1, above=True)] | None = None

@@ -27,8 +27,8 @@ MRAD2 = 1e6  # mrad^2 in a rad^2
 class OscillatorSheet(Sheet):
     """Sheet of an oscillator test.
 
-    interval_s        from reading to reading: 0.001 for single cycles at an IF of 1 kHz
-    half_wavelength_mm   of the modulation, turns phases into ranges
+    interval_s        time between readings: 0.001 for single cycles at an IF of 1 kHz
+    half_wavelength_mm   half wavelength of the modulation, turns phases into ranges
     cycles_per_range  readings that one range averages
     false_alarm       probability of calling noise a spur, over the whole spectrum
     """

@@ -28,14 +28,14 @@ SCATTER = "scatter of one reading"
 class LinearitySheet(AirSheet):
     """Sheet of a comparison with an interferometer.
 
-    d0_mm, pc_mm                      that the ranges contain: they lead back to the phase
-    interferometer_wavelength_um      in vacuum; needed for the column interferometer_vacuum_m
-    dead_path_m                       between interferometer and target at its zero
+    d0_mm, pc_mm                      D0 and range constant in the ranges, needed to recover the phase
+    interferometer_wavelength_um      vacuum wavelength; needed for the column interferometer_vacuum_m
+    dead_path_m                       length between interferometer and target at its zero
     u_interferometer_ppm              of its scale: wavelength, alignment
     u_abbe_mm                         of each position: pitch of the carriage times the offset of the beams
-    start_m, u_start_mm               from the scan point to the target where the interferometer reads zero, if known
+    start_m, u_start_mm               distance from scan point to target where the interferometer reads zero, if known
     u_range_mm                        of one range by itself, if known
-    random_walk_mm_per_sqrt_hour      of the ranger's drift; needs the column mjd_utc
+    random_walk_mm_per_sqrt_hour      random walk of the ranger's drift; needs the column mjd_utc
     max_order, orders                 highest cyclic order tried; the number of orders, if it is not to be tested
     u_cyclic_mm                       of each cyclic term where the rail is too short to find it
     """

@@ -47,10 +47,10 @@ SAFE = 5.0  # standard uncertainties of the coarse length that the margin of N m
 class ReferenceDistanceSheet(AirSheet):
     """Sheet of a calibration of D0.
 
-    d0_nominal_mm, u_d0_nominal_mm   from the drawing: decides the whole cycles
+    d0_nominal_mm, u_d0_nominal_mm   D0 by the drawing: decides the whole cycles
     pc_mm, u_pc_mm                   constant of the target, negative or 0; a column pc_mm where targets differ
     u_distance_mm                    of each known distance by itself (setting the target), if known
-    u_distance_common_mm             that all share (scan point to the zero of the scale)
+    u_distance_common_mm             of the part common to all distances (scan point to the zero of the scale)
     u_distance_ppm                   of the scale of the known distances
     u_phase_rad                      of each difference of phase, if known
     u_leakage_volt                   of each quadrature of the leakage; needs the columns of amplitudes

@@ -21,7 +21,7 @@ MICROMETRE = 1e-3 * MILLIMETRE
 class RepeatabilitySheet(Sheet):
     """Sheet of a repeatability test.
 
-    test_level   of the F test that the sets agree
+    test_level   significance level of the F test that the sets agree
     """
 
     test_level: Annotated[float, Within(0, 0.5, above=True)] = 0.05
