@@ -113,7 +113,7 @@ def test_problems_of_more_than_one_shot_come_first():
     passages = dict(summary(book, TwinWords(60635.125), None, seconds=60.0, rangers=18, told=3))
     assert passages["Events"].startswith("VER was not answered; ZY101 A: blocked (5 times)")
     assert "3 by 18 rangers in 60 s, all acknowledged; 1 blocked, 1 reflected" in passages["Shots"]
-    assert "1 epochs, 1 compared with the truth: 1 as claimed" in passages["Truth"]
+    assert "1 epoch, 1 compared with the truth: 1 as claimed" in passages["Truth"]
     assert "none was written" in passages["Journal"]
     assert (
         "none was solved"

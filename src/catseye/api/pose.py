@@ -279,7 +279,11 @@ def _refuse_without_site(*, earlier: bool, **arguments: Any) -> None:
     arguments   the others; None where they are not given
     """
     if earlier:
-        raise ArgumentError("earlier or site is needed: the epoch to count from, or the design", "earlier", "site")
+        raise ArgumentError(
+            "earlier or site is needed: the same points at another epoch or as designed, or a telescope's records",
+            "earlier",
+            "site",
+        )
     for name, value in arguments.items():
         if value is not None:
             raise ArgumentError(f"{name} needs site: the records of a telescope", name, "site")

@@ -172,7 +172,11 @@ def reduce(
 ) -> None:
     """A campaign's samples to coordinates, pose, surface and report; of several nights side by side."""
     if out is None and (len(campaign) > 1 or not json):
-        needed = "is needed for several nights." if len(campaign) > 1 else "is needed unless --json is given."
+        needed = (
+            "is needed for several nights."
+            if len(campaign) > 1
+            else "is needed unless --json is given: a directory for the report, such as --out night."
+        )
         raise typer.BadParameter(needed, param_hint="'--out'")
     if out is not None and len(campaign) > 1:
         if threads is not None:

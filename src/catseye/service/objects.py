@@ -9,6 +9,7 @@ from catseye.constants import ARCSECOND
 from catseye.coordinator.firing import GOOD, OF_THE_LINE
 from catseye.coordinator.journal.chain import Head
 from catseye.gateways.writers.verdict import Verdict
+from catseye.names import counted
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.service.book import RunSummary
 from catseye.service.comparison import EpochComparison
@@ -173,7 +174,7 @@ def summary(
         passages.append(
             (
                 "Truth",
-                f"{len(book.epochs)} epochs, {len(compared)} compared with the truth: {claims}. "
+                f"{counted(len(book.epochs), 'epoch')}, {len(compared)} compared with the truth: {claims}. "
                 f"The last, {epoch_line(last)}.",
             )
         )

@@ -40,7 +40,7 @@ def test_a_table_without_u_is_exact_unless_one_is_given():
     np.testing.assert_array_equal(given.covariance[0], 4e-8 * np.eye(3))
     own = read_point_table(PLAIN, "p.csv", u=2e-4)
     assert own.covariance[0, 0, 0] == pytest.approx(1e-8)
-    with pytest.raises(InputError, match=r"p.csv: has no uncertainty \(expected a column u_mm"):
+    with pytest.raises(InputError, match=r"p.csv: has no uncertainty \(expected a column u_mm.* u_mm \(--u-mm\)\)"):
         require_uncertainty(read_point_table(text, "p.csv"))
 
 

@@ -119,7 +119,7 @@ def test_missing_files_and_times_are_named(files, tmp_path):
     with pytest.raises(InputError, match=r"no\.csv: missing in"):
         read_readings(tmp_path / "no.csv", LAYOUT, tmp_path / "t.toml")
     (tmp_path / "t.toml").unlink()
-    with pytest.raises(InputError, match=r"t\.toml: missing in"):
+    with pytest.raises(InputError, match=r"t\.toml: missing in .* \(expected the sheet of t\.csv, TOML\)"):
         read_readings(path, LAYOUT)
     with pytest.raises(InputError, match="is given as the table and as its sheet"):
         read_readings(path, LAYOUT, path)

@@ -178,3 +178,7 @@ def test_a_formula_is_a_line_of_unicode(tex, text):
 def test_code_that_the_built_page_leaves_out_is_left_out(tag, shown):
     cell = f"# Page\n\n```{{code-cell}} ipython3\n:tags: [{tag}]\n%config Backend.formats = 1\n```\n\nText.\n"
     assert ("%config" in plain_markdown(cell)) == shown
+
+
+def test_a_title_has_no_backslash_of_its_markdown():
+    assert page_title("# Surveys of STAR\\*NET and `CSV`\n") == "Surveys of STAR*NET and CSV"

@@ -94,6 +94,25 @@ def test_one_blunder_is_likely_as_claimed_and_left_out_on_request(ring):
     assert without.verdict.why.endswith(", 1 left out")
 
 
+def test_a_constant_left_out_is_an_error_that_all_ranges_share(tmp_path):
+    """With --reject no single range is to blame; the large sigmas of the last solution are no claim of their maker."""
+    stations = {"A": (0, 0, 0), "B": (60, 2, 1), "C": (55, 48, -0.5), "D": (-3, 50, 2), "E": (30, 25, 15)}
+    targets = {"S": (20.5, 31.2, 6.1), "T": (41.3, 12.7, 8.4)}
+    points = [f"{name},{x},{y},{z},fixed" for name, (x, y, z) in stations.items()]
+    ranges = [
+        f"{one},{other},{np.linalg.norm(np.subtract(stations[one], targets[other])) + 0.0345:.4f},0.0005"
+        for one in stations
+        for other in targets
+    ]
+    (tmp_path / "points.csv").write_text("\n".join(["point,x,y,z,role", *points]) + "\n")
+    (tmp_path / "ranges.csv").write_text("\n".join(["from,to,distance,sigma", *ranges]) + "\n")
+    found = adjusted(read_network(tmp_path), AdjustmentOptions(reject=True))
+    assert found.verdict.word == "doubtful"
+    assert found.verdict.why.startswith("10 of 10 observations contradict each other, and which are wrong")
+    assert "such as a constant" in found.verdict.why
+    assert found.treatment.notes[0].startswith("which of the contradicting observations are wrong is undecided")
+
+
 def test_a_weight_tells_how_far_each_observation_counts(ring):
     found = adjusted(with_error(ring, 5, 0.01), AdjustmentOptions(robust="igg3"))
     weights = found.in_table(found.treatment.weights)

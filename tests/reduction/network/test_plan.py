@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 
 from catseye.errors import ArgumentError
+from catseye.estimation.network.plan import MOST_RANGES
 from catseye.estimation.quality.sample_covariance import covariance_test
+from catseye.gateways.network.plan import plan_passages
 from catseye.records.network.any_file import read_network
 from catseye.reduction.network import plan as plans
 from catseye.reduction.network.plan import MonteCarloOptions, PlanOptions, chunk_object, planned
@@ -52,6 +54,16 @@ def test_chunks_give_the_same_answer_to_the_last_bit_here_and_in_other_processes
     assert len(calls) > 3
     same(here, there)
     assert here.runs == 360
+
+
+def test_a_schedule_that_ends_at_its_limit_says_so(network):
+    short, long = (
+        dict(plan_passages(planned(network, PlanOptions(budget_s=seconds, shot_s=1.0))))["In the given time"]
+        for seconds in (5.0, 1000.0)
+    )
+    assert "the search ends" not in short
+    assert long.startswith(f"{MOST_RANGES} ranges, ")
+    assert long.endswith(f"; the search ends at {MOST_RANGES} ranges.")
 
 
 def test_few_runs_stay_in_the_process(network):

@@ -76,7 +76,7 @@ def test_a_design_without_u_is_exact(tmp_path):
     plain = table(tmp_path / "plain.csv", places + np.array([1e-3, 0.0, 0.0]), u="", names=names)
     again = catseye.pose(plain, design, u_mm=0.05)
     np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-9)
-    with pytest.raises(InputError, match="neither has uncertainties"):
+    with pytest.raises(InputError, match=r"neither has uncertainties .* u_mm \(--u-mm\)\)"):
         catseye.pose(plain, design)
 
 

@@ -16,6 +16,7 @@ from catseye.estimation.network.datum import with_datum
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
 from catseye.estimation.observations.kinds import Distances, ObservationGroup
 
+MOST_RANGES = 1000  # of a schedule
 BATCH = 200  # ranges per batch
 
 
@@ -134,7 +135,7 @@ def plan(
 
 
 def schedule(
-    chosen: Plan, *, budget_s: float, shot_s: float, most: int = 1000, repeats: bool = True
+    chosen: Plan, *, budget_s: float, shot_s: float, most: int = MOST_RANGES, repeats: bool = True
 ) -> tuple[Candidate, ...]:
     """Ranges to add, in order, each the best after those before it, within the time of every ranger.
 

@@ -77,8 +77,10 @@ def budget_passages(parts: PointBudget) -> list[Passage]:
         for axis, title in enumerate(AXES):
             k = int(np.argmax(parts.share[:, n, axis]))
             share = 100.0 * parts.share[k, n, axis]
+            of = " of the variance" if axis == 0 else ""
             phrases.append(
-                f"{title} u {micrometres(parts.u[n, axis])}, most of it by {parts.budget.sources[k]} ({share:.0f} %)"
+                f"{title} u {micrometres(parts.u[n, axis])}, the largest part from {parts.budget.sources[k]} "
+                f"({share:.0f} %{of})"
             )
         passages.append(Passage(name, "; ".join(phrases) + "."))
     return passages

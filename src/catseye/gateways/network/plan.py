@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.estimation.network.monte_carlo import MonteCarloScatter
-from catseye.estimation.network.plan import Candidate
+from catseye.estimation.network.plan import MOST_RANGES, Candidate
 from catseye.gateways.network.objects import network_object
 from catseye.gateways.network.report import MOST_OBSERVATIONS, provenance_section
 from catseye.gateways.network.report_charts import network_view, redundancy_chart
@@ -23,6 +23,7 @@ from catseye.gateways.writers.report import Block, Card, Heading, ReportSection,
 from catseye.gateways.writers.report_page import report_page
 from catseye.gateways.writers.report_parts import ReportTable, number, text, uncertainty
 from catseye.gateways.writers.written import Files, origin, write_files
+from catseye.names import counted
 from catseye.reduction.network.plan import PlannedNetwork
 from catseye.reduction.network.words import quantity
 
@@ -95,7 +96,7 @@ def plan_passages(planned: PlannedNetwork) -> list[Passage]:
         Passage(
             "The plan",
             f"{len(predicted.table)} observations of {len(predicted.names)} points would give the coordinates of "
-            f"{int(plan.interest.sum())} points with a standard uncertainty of {u}, root mean square; "
+            f"{counted(int(plan.interest.sum()), 'point')} with a standard uncertainty of {u}, root mean square; "
             f"datum: {predicted.solution.datum}.",
         )
     ]
@@ -136,10 +137,12 @@ def plan_passages(planned: PlannedNetwork) -> list[Passage]:
         last = planned.picked[-1]
         order = ", ".join(f"{c.from_} - {c.to}" for c in planned.picked[:6])
         more = f" and {len(planned.picked) - 6} more" if len(planned.picked) > 6 else ""
+        cap = f"; the search ends at {MOST_RANGES} ranges" if len(planned.picked) == MOST_RANGES else ""
         passages.append(
             Passage(
                 "In the given time",
-                f"{len(planned.picked)} ranges, {order}{more}, would bring it to {quantity(last.mean_u, 'm')}.",
+                f"{counted(len(planned.picked), 'range')}, {order}{more}, would bring it to "
+                f"{quantity(last.mean_u, 'm')}{cap}.",
             )
         )
     if planned.scatter is not None:

@@ -205,7 +205,7 @@ def _checks(adjusted: AdjustedNetwork) -> str:
         text += f"{names}."
     mdb = [
         f"{quantity(float(np.median(table.mdb[checked])), str(table.unit[np.argmax(checked)]))} of a "
-        f"{kind.replace('_', ' ')}"
+        f"{'coordinate' if kind == 'coordinates' else kind.replace('_', ' ')}"
         for k, kind in enumerate(table.kinds)
         if (checked := (table.kind == k) & table.checked).any()
     ]

@@ -169,11 +169,12 @@ def _u(columns: TextColumns, title: str, factor: float) -> np.ndarray:
     return values * factor
 
 
-def require_uncertainty(table: PointTable, option: str = "u_mm") -> np.ndarray:
+def require_uncertainty(table: PointTable, option: str = "u_mm (--u-mm)") -> np.ndarray:
     """Covariance of a table's points; InputError for a table without."""
     if table.covariance is None:
         raise InputError(
-            f"{table.file}: has no uncertainty (expected a column u_mm, or u_x_mm, u_y_mm and u_z_mm, or {option})"
+            f"{table.file}: has no uncertainty (expected a column u_mm, or u_x_mm, u_y_mm and u_z_mm, or the argument "
+            f"{option})"
         )
     return table.covariance
 

@@ -153,6 +153,8 @@ def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | Non
     if sheet_path.resolve() == path.resolve():
         raise refusal(path.name, "is given as the table and as its sheet (expected a table .csv and a sheet .toml)")
     page = Folder(sheet_path.parent)
+    if path.is_file() and not sheet_path.exists():
+        raise refusal(sheet_path.name, f"missing in {page.directory} (expected the sheet of {path.name}, TOML)")
     kind = toml_of(page.text(sheet_path.name), sheet_path.name).get("kind")
     if isinstance(kind, str) and kind != layout.kind:  # before its keys, which are another kind's
         raise refusal(

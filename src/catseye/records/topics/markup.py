@@ -13,6 +13,7 @@ FENCED = re.compile(  # code that is shown as it is
 OPTION = re.compile(r"^:(?P<key>[\w-]+):\s*(?P<value>.*)$")
 LABEL = re.compile(r"^\([\w.:/-]+\)=\s*$|^%( |$).*$")
 HEADING = re.compile(r"(?m)^# +(.+?)\s*$")
+ESCAPED = re.compile(r"\\([*_#\[\]])")  # a backslash before a mark that is no Markdown
 FRONT = re.compile(r"\A---\n.*?\n---\n", re.DOTALL)
 CODE = re.compile(r"(`+)(?!`).*?(?<!`)\1(?!`)", re.DOTALL)
 DISPLAY = re.compile(r"\$\$(.+?)\$\$(?:\s*\([\w:-]+\))?", re.DOTALL)
@@ -40,7 +41,7 @@ class Directive(NamedTuple):
 def page_title(text: str) -> str:
     """First heading of a page, "" without one."""
     heading = HEADING.search(FENCED.sub("", plain_markdown(text)))
-    return heading[1].replace("`", "") if heading else ""
+    return ESCAPED.sub(r"\1", heading[1]).replace("`", "") if heading else ""
 
 
 def plain_markdown(text: str) -> str:

@@ -307,6 +307,8 @@ def _verdict(network: AdjustedNetwork) -> Verdict:
     if len(network.suspects):
         text = "the network agrees overall with the claimed uncertainties, single observations do not"
         return Verdict("doubtful", f"{text}; {suspects_words(network)}")
+    if undecided := _undecided(network):
+        return Verdict("doubtful", undecided)
     if too_good(overall.factor * network.solution.degrees_of_freedom, network.solution.degrees_of_freedom):
         return Verdict("doubtful", _too_good(network))
     if overall.outcome == TOO_SMALL:
@@ -317,6 +319,23 @@ def _verdict(network: AdjustedNetwork) -> Verdict:
     unchecked, out = int(np.sum(network.table.active & ~network.table.checked)), int(np.sum(~network.table.active))
     text += f", {out} left out" if out else ""
     return Verdict("good", text + (f", but {unchecked} of them are not checked by others" if unchecked else ""))
+
+
+def _undecided(network: AdjustedNetwork) -> str:
+    """Contradicting observations on which points rest, in words; "" without.
+
+    They have almost no weight, so that a variance factor near 0 says nothing of their uncertainties.
+    """
+    treatment, table = network.treatment, network.table
+    if treatment is None:
+        return ""
+    rows = np.flatnonzero(network.in_table(treatment.undecided))
+    if not (table.active & ~table.checked)[rows].any():
+        return ""
+    text = f"{len(rows)} of {len(table)} observations contradict each other, and which are wrong cannot be decided"
+    if 2 * len(rows) > len(table):
+        return f"{text}: look for an error that they share, such as a constant, a unit or the air"
+    return f"{text}, first {network.label(int(rows[0]))}"
 
 
 def _too_good(network: AdjustedNetwork) -> str:

@@ -9,7 +9,7 @@ from catseye.aliases import Progress
 from catseye.constants import PPM
 from catseye.errors import ArgumentError, EstimationError
 from catseye.estimation.least_squares.adjustment import COMPLETE, GroupFit, SolverSettings
-from catseye.estimation.least_squares.status import CONVERGED
+from catseye.estimation.least_squares.status import CONVERGED, AdjustmentOutcome, Status
 from catseye.estimation.network.adjustment import NetworkSettings, adjust_network, fits_near
 from catseye.estimation.network.approximate.start import approximate
 from catseye.estimation.network.cures import inflation_of, targets_of_ranges
@@ -223,8 +223,20 @@ def _with_rejections(
         rejected=chosen.rejected,
         undecided=chosen.undecided,
         rejections=chosen.rejections,
-        notes=() if chosen.status == CONVERGED else (f"rejection {chosen.status}",),
+        notes=_rejection_notes(chosen.status),
     )
+
+
+def _rejection_notes(status: Status) -> tuple[str, ...]:
+    """Note on a search for wrong observations; the treatment itself names those that contradict each other."""
+    if status == CONVERGED:
+        return ()
+    if status.outcome is AdjustmentOutcome.UNDECIDED:
+        loose = f"are held loosely, with their uncertainties times {MOST_INFLATION:.0f} or more"
+        return (
+            f"which of the contradicting observations are wrong is undecided; points that only they determine {loose}",
+        )
+    return (f"rejection {status}",)
 
 
 def _placed(network: ObservationNetwork) -> tuple[ObservationNetwork, Placed]:

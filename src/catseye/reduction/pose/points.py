@@ -47,7 +47,7 @@ def pose_of_points(
     if covariance.first is None and covariance.second is None:
         raise InputError(
             f"{later.file} and {earlier.file}: neither has uncertainties (expected a column u_mm in one of them, or "
-            "u_mm)"
+            "the argument u_mm (--u-mm))"
         )
     fitted = fit_pose(names, first, second, frame=frame, covariance=covariance, robust=robust)
     used = np.isin(names, fitted.names)

@@ -156,7 +156,7 @@ def _implausible(shape: SurfaceShape, dish: DishDesign) -> str:
     if abs(change) > most + SURE * fit.u_focal_length:
         return (
             f"focal length {fit.focal_length:.3f} m, {design} is {aperture.focal_length:.3f} m (expected within "
-            f"{most:.2f} m): another dish?"
+            f"{most:.2f} m); this may be another dish"
         )
     if dish.site is None:
         return ""
