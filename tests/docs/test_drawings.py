@@ -6,8 +6,10 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from drawings import FOLDER, draw
 from repository import ROOT
+
+pytest.importorskip("sphinx.application", reason="extra docs is not installed")
+from drawings import FOLDER, draw
 
 PAGE = (ROOT / "docs" / "conventions.md").read_text(encoding="utf-8")
 IMAGE = re.compile(r"!\[([^\]]+)\]\(reference/drawings/([\w-]+)\.svg\)")
@@ -16,7 +18,6 @@ IMAGE = re.compile(r"!\[([^\]]+)\]\(reference/drawings/([\w-]+)\.svg\)")
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory):
     """Every drawing, in a folder of its own."""
-    pytest.importorskip("sphinx.application", reason="extra docs is not installed")
     return draw(tmp_path_factory.mktemp("drawings"))
 
 

@@ -181,7 +181,7 @@ EVENTS = {
     "its connection lost, or its program killed": lost,
     "the coordinator ended": ended,
     "its holder silent for 30 s": silent,
-    "its holder asking but ordering nothing": asking,
+    "its holder reading but sending no command": asking,
     "another connection lost": other_lost,
     "PS 0": order("holder", "PS 0"),
     "PS 0 from outside the lease": order("other", "PS 0"),

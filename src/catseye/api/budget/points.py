@@ -33,6 +33,9 @@ class BudgetResult(Result):
     kinds          names of the s kinds: errors of the shots, of the records, and errors in common
     contribution   (s, n, 3) m, what each kind alone would leave; their squares add up to u²
     share          (s, n, 3) of the variance
+    parts          everything else: the budget of the coordinates
+    campaign       as it was read
+    air_model      name of the model of the index
     """
 
     points: tuple[str, ...]
