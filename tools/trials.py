@@ -205,7 +205,7 @@ def tried(python: str, build: Build, place: Path, version: str, *, constraints: 
 
 
 def attempted(python: str, build: Build, place: Path, version: str, *, constraints: Path | None = None) -> bool:
-    """Whether the trial with an interpreter succeeded; its fault is printed."""
+    """True if the trial with an interpreter succeeded; print the reason of a failure."""
     say(f"Python {'.'.join(map(str, version_of(python)))}:")
     try:
         tried(python, build, place, version, constraints=constraints)

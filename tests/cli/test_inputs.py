@@ -1,4 +1,4 @@
-"""What all commands share: names of examples, help by subject, progress, and `python -m catseye`."""
+"""Features of all commands: names of examples, help by subject, progress, and `python -m catseye`."""
 
 import json
 import subprocess

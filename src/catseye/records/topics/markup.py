@@ -55,7 +55,7 @@ def plain_markdown(text: str) -> str:
 
 
 def has_prose(text: str) -> bool:
-    """Whether a page says anything that is not made by the build, headings aside."""
+    """True if a page has text of its own, beside headings and what the build makes."""
     lines = plain_markdown(text).splitlines()
     return any(line and not line.startswith(("#", BUILT, IN_PYTHON)) for line in lines)
 
