@@ -17,6 +17,7 @@ def with_shots(campaign, rows, **columns):
         if isinstance(getattr(shots, f.name), tuple)
         else getattr(shots, f.name)[rows]
         for f in dataclasses.fields(shots)
+        if getattr(shots, f.name) is not None
     }
     return dataclasses.replace(campaign, shots=dataclasses.replace(shots, **(picked | columns)))
 

@@ -21,8 +21,8 @@ LEAST_SHOTS = 4  # of a prism: three shots check nothing
 DRAWS = 2000
 
 
-def natural_night(seed, dish_prisms):
-    """Weather, posture and nature drawn from the seed: winter to summer, inversion to lapse, horizon to zenith."""
+def natural_setting(seed, dish_prisms):
+    """Arguments of a night, drawn from the seed: winter to summer, inversion to lapse, horizon to zenith."""
     rng = np.random.default_rng(seed)
     whole_dish = dish_prisms > 1500
     conditions = AirConditions(
@@ -35,7 +35,12 @@ def natural_night(seed, dish_prisms):
     )
     stands = SimulatedTelescope(rng.uniform(0.0, 360.0), rng.uniform(10.0, 85.0), dish_prisms)
     rule = Schedule(interval_s=8.0, again=0.43) if whole_dish else Schedule()
-    return simulate_night(seed, telescope=stands, conditions=conditions, schedule=rule, nature=Nature.drawn(seed))
+    return {"telescope": stands, "conditions": conditions, "schedule": rule, "nature": Nature.drawn(seed)}
+
+
+def natural_night(seed, dish_prisms):
+    """Weather, posture and nature drawn from the seed."""
+    return simulate_night(seed, **natural_setting(seed, dish_prisms))
 
 
 def kind_of(name, campaign):

@@ -10,6 +10,7 @@ FORMS = {
     ParameterKind.LEAKAGE: rf"leakage {OF} (?P<part>real|imaginary)",
     ParameterKind.AXES: rf"axes {OF} (?P<part>.+)",
     ParameterKind.AMPLITUDE: rf"amplitude {OF}",
+    ParameterKind.SECOND_PASS: rf"second pass {OF} (?P<part>.+)",
     ParameterKind.CYCLIC: rf"cyclic {OF} (?P<part>.+)",
     ParameterKind.GLASS: rf"glass {OF}",
     ParameterKind.SOUND: r"the air (?P<of>\S+) - (?P<part>\S+)",

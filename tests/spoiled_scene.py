@@ -25,7 +25,8 @@ SCATTER_KEYS = {  # by which a sheet states the scatter of its readings
     "both-faces": ("u_distance_mm",), "both-faces-pointing": ("u_counts",), "encoder": ("u_reading_arcsec",),
     "limits": ("u_touch_counts",), "alignment": ("u_spot_mm",), "detector-focus": ("u_amplitude_share",),
     "monument-azimuth": ("u_direction_arcsec",), "plate-levels": ("u_level_arcsec",), "inclinometer": ("u_volt",),
-    "hydrostatic-level": ("u_reading_mm",),
+    "hydrostatic-level": ("u_reading_mm",), "reference-cube": ("u_amplitude_volt",),
+    "mounting-plate": ("u_direction_arcsec",),
 }  # fmt: skip
 # What no file can show: the spoiled table is as good a table of another thing. Kind, columns, ways, and why.
 UNSEEN = (

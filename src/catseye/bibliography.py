@@ -32,14 +32,18 @@ SOURCES: dict[str, Source] = {
         title="D. H. Parker, Working notes on the Green Bank Telescope laser metrology system, 2004",
         locator="National Radio Astronomy Observatory, 29 April 2004",
         used="chapter 1, eqs. 1.3-1.53: humidity, barometer, index of air and glass, a path as a refractometer "
-        "(`atmosphere.weather`, `atmosphere.index`, `atmosphere.path`, `optics.glass`, `reduction.air`); chapter 2, "
-        "section 2.1, eqs. 2.3-2.26, 2.40-2.47: frames, mirror, counts, track, Sun (`geometry`, `ranger`, "
-        "`reduction.site`, `reduction.steering`); chapter 3, eqs. 3.1-3.7: positions and their differences "
-        "(`estimation.network.positions`, `estimation.deformation.differential`); chapter 4, eqs. 4.1-4.14: speed of "
-        "sound (`atmosphere.sound`, `reduction.air.acoustic`); chapter 5, eqs. 5.1-5.19: phase, whole cycles, range "
-        "(`signal`, `ranger.ranging`, `reduction.epoch`); chapter 6, items 1 and 3 to 5: lens, multiple paths, "
-        "feedback, amplitude (`optics.receiver`, `signal.systematics`); chapters 7 and 8: what is to be calibrated "
-        "(`reduction.calibrations`). `simulator.night` and `simulator.twin` write what they need a second time",
+        "(`atmosphere`, `optics.glass`, `optics.glass_table`, `reduction.air`); chapter 2, section 2.1, eqs. 2.3-2.26, "
+        "2.40-2.47: frames, mirror, counts, track, Sun (`geometry`, `ranger`, `reduction.site`, `reduction.steering`), "
+        "a telescope that bends and swings (`reduction.structure`, `reduction.pose`); chapter 3, eqs. 3.1-3.7: "
+        "positions and their differences (`estimation.network.positions`, `estimation.deformation.differential`, "
+        "`reduction.deformation`), sections 3.2 and 3.3: networks, plans, layouts (`records.network`, "
+        "`reduction.network`, `reduction.design`); chapter 4, eqs. 4.1-4.14: speed of sound (`atmosphere.sound`, "
+        "`reduction.air`); chapter 5, eqs. 5.1-5.19: phase, whole cycles, range (`signal`, `ranger.ranging`, "
+        "`reduction.detection`, `reduction.epoch`, `reduction.live`, `reduction.budget`); chapter 6, items 1 and 3 to "
+        "6, sections 6.1-6.3: lens, multiple paths, feedback, amplitude, coatings, retroreflectors, beam, servo "
+        "(`optics`, `signal.systematics`, `reduction.optics`); chapters 7 and 8: what is to be calibrated and was "
+        "measured (`reduction.calibrations`, `reduction.baseline`, `reduction.scans`); chapter 11: the panel setting "
+        "instrument (`reduction.panels`). `simulator` writes what it needs a second time",
         errata=(
             "1.2 prints 384 615.3 GHz for 780 nm (c taken as 3e8 m/s); 384 349.3 GHz, the sidebands likewise",
             "1.11 names the local station pressure p_t, p_l is meant; there is no 1.17",
@@ -73,17 +77,24 @@ SOURCES: dict[str, Source] = {
     "GOLDMAN00": Source(
         title="M. A. Goldman, Calibration of the GBT triplet retroreflector units, 2000",
         locator="National Radio Astronomy Observatory, 29 June 2000",
-        used="eqs. 3.8-3.10, 3.14 and B.1: what glass adds (`optics.retroreflector`, `reduction.epoch.coordinates`); "
+        used="eqs. 3.8-3.10, 3.14 and B.1: what glass adds (`optics.retroreflector`, `optics.glass`, "
+        "`reduction.epoch.coordinates`, `reduction.calibrations.ranging`); "
         "sections 1.3, 2.2, 2.3, 3.1-3.4, eqs. 3.5, 3.11-3.29: a unit (`records.laboratory.triplet_measurement`, "
-        "`reduction.triplet.unit`, `reduction.triplet.geometry`, `reduction.triplet.memo`, `gateways.triplet`); eqs. "
+        "`reduction.triplet.unit`, `reduction.triplet.plate`, `reduction.triplet.geometry`, `reduction.triplet.memo`, "
+        "`gateways.triplet`); eqs. "
         "3.13, 3.16: its whole cycles (`signal.cycles.whole`); A.1-A.8, D.1-D.5: tolerances "
-        "(`reduction.triplet.tolerances`, `reduction.triplet.sensitivity`); section 1.1, appendix C, figure 10: a unit "
-        "on the telescope (`reduction.triplet.use`, `reduction.triplet.ties`, `geometry.antenna.triplet_mount`)",
+        "(`reduction.triplet.tolerances`, `reduction.triplet.sensitivity`, `reduction.triplet.bounds`); section 1.1, "
+        "appendix C, figure 10: a unit on the telescope (`reduction.site.places`, `coordinator.visibility.vantage`, "
+        "`reduction.triplet.use`, `reduction.triplet.ties`, "
+        "`reduction.triplet.reduced_ranges`, "
+        "`reduction.triplet.local_net`, `reduction.triplet.aiming`, `geometry.antenna.triplet_mount`); eqs. 3.2-3.7: a "
+        "hollow target (`reduction.triplet.hollow`); sections 1.2, 3.3: a record (`reduction.triplet.installed`)",
         errata=(
             "3.19 prints (delta1 + delta2)/2 inside the root; (delta1 + delta2)/Delta is right",
             "3.19a, leaves D_12^2 (delta1 + delta2) / 16 Delta^2 out: 15 um at 18 m",
             "two equations are numbered 3.8, two 3.16, two 3.20",
             "3.11a, 3.15b and the second 3.16 write (1 - sgn)/2, a half at equal phases; 3.13a and 3.16a give none",
+            "3.3 prints Phi_Cal beside cycles: Phi_Cal/2pi is right",
             "3.12 bounds a sum of phases in rad by 1: 1/2pi is missing, the bound is one cycle, 6.28 rad",
             "3.13 and 3.16 slip by a half wavelength where range and D_TOPPL straddle a boundary: round to the nearest",
             "1.3 has prisms 38.10 mm high, 3.4 some 38.4: 0.20 mm of H_rp, 0.26 mm of P_c; sheets have their own",
@@ -124,7 +135,9 @@ SOURCES: dict[str, Source] = {
         used="eqs. 5.23, 5.24, 5.27-5.29 (`atmosphere.weather`), A.4, A.5, A.10 (`atmosphere.index.rueger1990`), as "
         "PARKER04 quotes them; the resolutions of 1960 and 1963 with BARRELL39's formula "
         "(`atmosphere.index.barrell_sears1963`); velocity corrections (`atmosphere.sound.velocity`) and the reduction "
-        "of slope distances (`reduction.baseline.lengths`); cyclic errors (`signal.systematics.cyclic`)",
+        "of slope distances (`reduction.baseline.lengths`, `reduction.network`); cyclic errors "
+        "(`signal.systematics.cyclic`, `reduction.calibrations.ranging`); wet bulbs and their slopes "
+        "(`atmosphere.index.hygrometer`, `reduction.air`); slopes of the index (`reduction.triplet.tolerances`)",
     ),
     "OWENS67": Source(
         title="J. C. Owens, Optical refractive index of air: dependence on pressure, temperature and composition, 1967",
@@ -176,7 +189,9 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1007/978-3-319-11550-4",
         used="chapter 2: propagation, standard ellipsoids (`estimation.quality.ellipsoid`); chapter 4: Gauss-Markov "
         "model with priors and constraints, evaluation, tests, robust estimation (`estimation.least_squares`, "
-        "`estimation.quality`, `estimation.network`, `estimation.deformation`, `reduction.calibrations`); chapter 15: "
+        "`estimation.quality`, `estimation.network`, `estimation.deformation`, `estimation.design`, "
+        "`reduction.calibrations`, `reduction.network`, `reduction.air`, `reduction.live`, `reduction.triplet`, "
+        "`signal.systematics`); chapter 15: "
         "elimination of points from the normal equations (`estimation.network.multilateration`)",
     ),
     "HUBER09": Source(
@@ -396,7 +411,8 @@ SOURCES: dict[str, Source] = {
         title="A. E. Siegman, Lasers, University Science Books, 1986",
         locator="ISBN 978-0-935702-11-8",
         used="chapters 15, 17 (eqs. 17.4, 17.5, 17.11), 20: ray matrices, Gaussian beams, share through an aperture, "
-        "the Huygens integral (`optics.abcd`, `optics.gaussian_beam`, `optics.spot`, `reduction.optics`)",
+        "the Huygens integral (`optics.abcd`, `optics.gaussian_beam`, `optics.spot`, `reduction.optics`, "
+        "`reduction.calibrations.mirror`)",
     ),
     "GOODMAN05": Source(
         title="J. W. Goodman, Introduction to Fourier optics, third edition, Roberts, 2005",
@@ -446,7 +462,7 @@ SOURCES: dict[str, Source] = {
     "JCGM101": Source(
         title="JCGM, Propagation of distributions using a Monte Carlo method, supplement 1 to the guide, 2008",
         locator="JCGM 101:2008",
-        used="clauses 6.4 (distributions), 7.2-7.9 (Monte Carlo, adaptive), 8.1 (validation), 9.2 and 9.4 (tests)",
+        used="clauses 6.4 (distributions), 7.2-7.9 (Monte Carlo, tolerance), 8.1 (validation), 9.2 and 9.4 (tests)",
     ),
     "ISO12": Source(
         title="ISO 17123-4, Field procedures for testing geodetic instruments: electro-optical distance meters, 2012",
@@ -733,7 +749,8 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1017/CBO9781139644181",
         used="section 1.4.2, eqs. 29, 30, 43: Stokes' parameters; section 1.5.2, eq. 21: Fresnel's formulae; section "
         "1.5.4, eq. 61: phases of total reflection; section 14.2, eq. 13: metals (`optics.polarization`); the same "
-        "formulae squared, for the faces of a retroreflector (`optics.retroreflector.interface`)",
+        "formulae squared, for the faces of a retroreflector (`optics.retroreflector.interface`); section 8: "
+        "diffraction (`optics.gaussian_beam`)",
     ),
     "ISO17": Source(
         title="ISO/IEC 17025, General requirements for the competence of testing and calibration laboratories",
@@ -811,11 +828,6 @@ SOURCES: dict[str, Source] = {
         locator="International Organization for Standardization, Geneva, 2005",
         used="the beam propagation ratio M^2",
     ),
-    "SELF83": Source(
-        title="S. A. Self, Focusing of spherical Gaussian beams, Applied Optics 22, 1983",
-        locator="doi:10.1364/AO.22.000658",
-        used="the thin-lens formula for waists",
-    ),
     "COLLINS70": Source(
         title="S. A. Collins, Lens-system diffraction integral written in terms of matrix optics, 1970",
         locator="doi:10.1364/JOSA.60.001168",
@@ -825,12 +837,6 @@ SOURCES: dict[str, Source] = {
         title="H. A. Macleod, Thin-film optical filters, fourth edition, CRC Press, 2010",
         locator="ISBN 978-1-4200-7302-7",
         used="chapters 2 and 6: characteristic matrix, tilted admittances, quarter-wave stacks (`optics.coating`)",
-    ),
-    "BABIC92": Source(
-        title="D. I. Babić and S. W. Corzine, Analytic expressions for the reflection delay, penetration depth, "
-        "and absorptance of quarter-wave dielectric mirrors, 1992",
-        locator="doi:10.1109/3.123281",
-        used="delay of an endless quarter-wave mirror",
     ),
     "JOHNSON72": Source(
         title="P. B. Johnson and R. W. Christy, Optical constants of the noble metals, Physical Review B 6, 1972",

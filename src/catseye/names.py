@@ -1,4 +1,4 @@
-"""Names that files, options and registries share: air models and kinds of retroreflector; and counts of names.
+"""Names that files, options and registries share: air models and kinds of retroreflector; and words of numbers.
 
 A registry imports the file of each name, so that a new air model or a new kind is its file and one word here. This
 module imports nothing, which keeps `--help` quick.
@@ -18,6 +18,15 @@ RETROREFLECTORS: Final[tuple[RetroreflectorName, ...]] = get_args(Retroreflector
 
 AIR_MODEL: Final = "ciddor_hill1999"  # of new work
 NOTES_AIR_MODEL: Final = "rueger1990"  # of the working notes, which version 1 of the campaign's layout prescribes
+
+
+def megahertz(frequency_hz: float) -> str:
+    """Frequency in words, to the hertz.
+
+    >>> megahertz(1500.5e6)
+    '1500.5 MHz'
+    """
+    return f"{frequency_hz / 1e6:.10g} MHz"
 
 
 def counted(count: int, noun: str) -> str:

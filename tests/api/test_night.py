@@ -1,9 +1,54 @@
 """A night, a shot and the examples from Python: pages, examples copied, arguments refused by name."""
 
+import io
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import catseye
 from catseye.errors import ArgumentError, InputError
+from catseye.gateways.epoch.record_tests import listed_tests
+from gateways.record_scene import with_checks
+
+
+@pytest.fixture(scope="module")
+def doubted():
+    """Night-01 with contradictions, unchecked points and an unmeasured target."""
+    night = catseye.reduce("night-01")
+    return replace(night, reduction=with_checks(night.reduction))
+
+
+def test_records_are_a_table_with_the_unit_of_each_row(doubted):
+    records = doubted.records
+    tests = listed_tests(doubted.reduction.coordinates)
+    assert list(records["record"]) == [test.record for test in tests]
+    assert list(records["unit"]) == [test.unit for test in tests]
+    np.testing.assert_array_equal(records["error"], [test.error for test in tests])
+    tested = np.isfinite(records["u_error"])
+    np.testing.assert_allclose(records["w"][tested], (records["error"] / records["u_error"])[tested])
+    assert records.colnames == doubted.to_table("records").colnames
+    assert list(doubted.to_table("contradictions")["contradiction"]) == [1, 1, 1, 2, 2]
+
+
+def test_contradictions_and_checks_of_a_night(doubted):
+    first, second = doubted.contradictions
+    assert first.named.record == "monument ZY103"
+    assert second.named is None
+    assert doubted.unchecked == ("DP003", "ZEG41040L")
+    assert doubted.unmeasured == ("ZEG41099L",)
+    assert [scatter.name for scatter in doubted.scatter] == ["dish", "feed arm"]
+    points = doubted.to_table("points")
+    np.testing.assert_array_equal(points["lines"], doubted.lines)
+    assert set(points["point"][points["status"] == "unchecked"]) == set(doubted.unchecked)
+
+
+def test_a_contradicted_night_says_so_in_its_paragraph_and_shows_it(doubted):
+    assert "Contradicted by the ranges: monument ZY103; benchmark" in " ".join(repr(doubted).split())
+    assert "records" not in repr(replace(doubted, reduction=catseye.reduce("night-01").reduction))
+    picture = io.BytesIO()
+    catseye.show(doubted, "records")["records"].savefig(picture, format="png")
+    assert picture.getvalue().startswith(b"\x89PNG")
 
 
 def test_a_shot_s_page_and_its_table(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,3 +100,40 @@ def test_an_output_over_an_input_is_refused(tmp_path):
 def test_invalid_arguments_are_refused_by_name(call, name):
     with pytest.raises(ArgumentError, match=name):
         call()
+
+
+BENT = {"structure": "structural-model/telescope.toml", "site": "gbt", "temperature_c": 5.0}
+
+
+def test_a_series_beside_a_structural_model_is_that_of_what_the_model_leaves():
+    """Stars of a telescope that bends by the model: with it the series alone comes back, without it another."""
+    stars = catseye.fit_pointing("pointing/stars.dat").findings.observations.stars
+    series = catseye.fit_pointing("pointing/stars.dat").findings.fit.series
+    found = catseye.displace_model(
+        BENT["structure"],
+        posture_deg=np.degrees(np.column_stack([stars.azimuth, stars.elevation])),
+        temperature_c=BENT["temperature_c"],
+        site=BENT["site"],
+        points="ZEG41040L",
+    )
+    seen = series.correction(stars.azimuth, stars.elevation) + found.beam.correction
+    encoders = stars.azimuth + seen[:, 0] / np.cos(stars.elevation), stars.elevation + seen[:, 1]
+    bent = replace(stars, azimuth_encoder=encoders[0], elevation_encoder=encoders[1])
+    fit = catseye.fit_pointing(bent, **BENT)
+    np.testing.assert_allclose(fit.values, series.values, rtol=0, atol=1e-12)
+    assert fit.sky_rms < 1e-13
+    plain = catseye.fit_pointing(bent)
+    assert np.max(np.abs(plain.values - series.values)) > 10 * ARCSECOND
+    both = catseye.predict_pointing(np.degrees(stars.azimuth), np.degrees(stars.elevation), model=series, **BENT)
+    np.testing.assert_allclose(both.correction, seen, rtol=0, atol=1e-13)
+    moved = both.encoders[:, 1] - stars.elevation
+    np.testing.assert_allclose(moved, seen[:, 1], rtol=0, atol=1e-13)
+
+
+def test_half_of_a_structural_models_arguments_is_refused():
+    with pytest.raises(catseye.ArgumentError, match="structure needs site"):
+        catseye.predict_pointing(0.0, 45.0, structure=BENT["structure"])
+    with pytest.raises(catseye.ArgumentError, match="temperature_c needs structure"):
+        catseye.fit_pointing("pointing/stars.dat", temperature_c=3.0)
+    with pytest.raises(catseye.ValidityError, match="elevation -2 deg"):
+        catseye.predict_pointing(0.0, -2.0, **BENT)

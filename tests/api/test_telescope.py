@@ -81,7 +81,7 @@ def test_a_slewing_telescope_is_followed_and_one_that_stands_still_has_the_count
         MONUMENT, MIRROR, [0.0, 0.0, 50.0], frame="ground", start_deg=(145.0, 30.0), end_deg=(145.0, 30.0)
     )
     np.testing.assert_allclose(still.counts[0, 0], here.counts[0] if here.allowed[0] else here.prime[0], atol=1e-6)
-    with pytest.raises(InputError, match="posture 145, 200 deg"):
+    with pytest.raises(InputError, match="start_deg = 145, 200"):
         catseye.track(MONUMENT, MIRROR, [0.0, 0.0, 50.0], start_deg=(145.0, 200.0), end_deg=(145.0, 30.0))
 
 

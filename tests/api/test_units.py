@@ -30,6 +30,18 @@ OUR_OWN = {  # functions that people do not call: what goes in is catseye's own 
         f"catseye.api.live.serving.{name}"
         for name in ("zy", "coordinator_orders", "mjd_start", "within", "twin_options", "twin_world")
     ),
+    *(
+        f"catseye.api.live.{name}"
+        for name in ("address.page_address", "beside.site_page", "limits.within", "watching.watch_site")
+    ),
+    *(f"catseye.api.telescope.displacement.{name}" for name in ("postures_of", "antenna_from", "site_from")),
+    *(
+        f"catseye.api.telescope.inputs.{name}"
+        for name in ("InputFiles.read", "InputFiles.points", "InputFiles.ranger", "points_of", "refuse_alone")
+    ),
+    *(f"catseye.api.telescope.inputs.{name}" for name in ("posture_of", "mjd_of_argument", "telescope_of")),
+    "catseye.api.telescope.model_fit.free_components",
+    *(f"catseye.api.triplet.ranges.{name}" for name in ("triplets_of", "require_zero")),
     "catseye.api.result.json_text",
     "catseye.api.result.quantities",
     *(f"catseye.api.units.{name}" for name in ("with_units", "plain_arguments", "declared", "plain", "unit_of_name")),
@@ -47,7 +59,10 @@ OTHER = {  # unit of ours -> another unit, and what one of ours is in it, by han
     "m2": ("mm2", 1e6),
     "s": ("min", 1.0 / 60.0),
     "mrad": ("rad", 1e-3),
+    "rad": ("mrad", 1e3),
+    "MHz": ("kHz", 1e3),
     "rad / s": ("mrad / s", 1e3),
+    "m / s": ("km / h", 3.6),
     "m / s2": ("mm / s2", 1e3),
     "mW": ("W", 1e-3),
     "uW": ("mW", 1e-3),
@@ -64,7 +79,7 @@ OTHER = {  # unit of ours -> another unit, and what one of ours is in it, by han
 
 def functions():
     """Every public function and method of every module of `catseye.api`, of today and of later."""
-    for found in pkgutil.iter_modules(catseye.api.__path__, "catseye.api."):
+    for found in pkgutil.walk_packages(catseye.api.__path__, "catseye.api."):
         module = import_module(found.name)
         for name, value in vars(module).items():
             if name.startswith("_") or getattr(value, "__module__", "") != found.name:
@@ -118,9 +133,11 @@ def test_the_unit_declared_is_the_one_of_the_name(function, argument, unit):
     else:
         assert unit.unit in (
             "",
+            "V",
             "m",
             "m2",
             "s",
+            "m / s",
             "m / s2",
             "min",
             "mrad / h(1/2)",
@@ -304,6 +321,8 @@ def test_settings_and_keywords_are_in_the_units_of_their_names():
         ([[1.0 * u.m, 2.0 * u.m], [3.0, 4.0]], "with a unit and values without"),
         ("20", "is text"),
         (np.array(["1", "2"]), "holds <U1"),
+        (["1", "2"], "holds text"),
+        ([["1", "2"], [1.0, 2.0]], "holds text"),
         (1.0 + 2.0j, "is a complex"),
         (np.array([1j]), "holds complex128"),
         (np.timedelta64(5, "s"), "holds timedelta64"),

@@ -35,7 +35,17 @@ WITHOUT_EXAMPLES = {  # paths that are read and have no bundled example
         "inputs",
         "page_key",
     ),
-    *("page_certificate", "page_token_file", "poses", "positions", "sources", "survey_left", "zy files"),
+    *(
+        "page_certificate",
+        "page_token_file",
+        "pose",
+        "poses",
+        "positions",
+        "replaces",
+        "sources",
+        "survey_left",
+        "zy files",
+    ),
 }
 
 
@@ -72,7 +82,7 @@ def bash(tmp_path, monkeypatch):
         (["refractometer", "--model", "r"], ["rueger1990"]),
         (["calibrate", "height"], ["height-gauge"]),
         (["calibrate", "encoder", "calib"], ["calibrations/encoder-planted.csv", "calibrations/encoder.csv"]),
-        (["certificate", "mirror", "mir"], ["mirrors/ZP3.toml"]),
+        (["certificate", "mirror", "mir"], ["mirrors/ZP103.toml", "mirrors/ZP3.toml"]),
         (["reduce", "nigh"], ["night-01", "nights/"]),
         (["simulate", "g"], ["gbt"]),
         (["reduce", "nights"], []),  # no example: bash completes the folder itself

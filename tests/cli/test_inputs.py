@@ -30,36 +30,15 @@ def callbacks():
 
 
 READ = [
-    *(
-        "addresses",
-        "against",
-        "archive",
-        "as_left",
-        "calibrations",
-        "campaign",
-        "cmm",
-        "earlier",
-        "epoch",
-        "epochs",
-        "file",
-        "files",
-    ),
-    *(
-        "heights",
-        "inputs",
-        "instrument",
-        "interlocks",
-        "job",
-        "keep_out",
-        "laboratory",
-        "later",
-        "mirror",
-        "monument",
-        "network",
-    ),
-    *("observations", "page_certificate", "page_key", "page_token_file", "poses", "positions"),
-    *("readings", "record", "sheet", "site", "solids", "sources", "survey"),
-    *("survey_left", "tilts", "train"),
+    *("addresses", "after", "against", "angles", "archive", "as_left", "before", "buffer"),
+    *("calibrations", "campaign", "cmm", "constraints", "earlier", "epoch", "epochs"),
+    *("file", "files", "heights", "inputs", "instrument", "interlocks", "job", "keep_out"),
+    *("laboratory", "later", "mirror", "model", "monument", "mount", "moves", "network", "nodes"),
+    *("observations", "page_certificate", "page_key", "page_token_file"),
+    *("points", "pose", "poses", "positions", "ranges", "readings", "record", "replaces"),
+    *("result", "scans", "series", "sheet", "site", "solids", "sources", "stations"),
+    *("structure", "survey", "survey_left", "table", "targets", "tilts", "times", "train"),
+    "weather",
 ]
 
 
@@ -210,3 +189,30 @@ def test_a_number_without_sentences_of_its_kind_is_still_told():
         ("a b", "1.5"),
         ("of", "x y 1, 2.25"),
     ]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "locate positions/stations.csv positions/ranges.csv",
+        "movements movements/before.csv movements/after.csv --points movements/points.csv",
+        "path weather/stations.csv --start=0,0,3 --end=100,0,40",
+        "weather weather/valley.csv",
+        "phase buffers/clipped.csv",
+        "model displace structural-model/telescope.toml --posture 145,45",
+        "convert --point 0,0,60 --from-frame reflector --to-frame ground --posture 145,30",
+        "triplets bound",
+        "scan compare scans/incidence.csv scans/rotation.csv",
+        "scan fit scans/azimuth.csv scans/elevation.csv --mirror night-01/mirrors/ZP103.toml",
+        "follow vibration/quadrant.csv --slope-mm 10 --u-signal 0.002 --modes 2",
+        "cycles cycles/three-frequencies.csv --group-index 1.000253",
+        "servo identify servo/moves.csv",
+        "frequencies --disturbance 0.001",
+        "acoustic-field acoustic/array-stations.csv acoustic/array-times.csv --sheet acoustic/array-times.toml",
+    ],
+    ids=lambda line: " ".join(line.split()[:2]),
+)
+def test_an_earlier_output_is_replaced(catseye, line):
+    for _ in range(2):
+        status, _, complaint = catseye(*line.split(), "--out", "made")
+        assert (status, complaint) == (0, "")

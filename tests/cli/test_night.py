@@ -1,6 +1,7 @@
 """`catseye night`: a campaign from a seed that reduces to its truth."""
 
 import json
+import tomllib
 
 import numpy as np
 import pytest
@@ -46,6 +47,29 @@ def test_the_same_seed_is_the_same_night_and_python_makes_it_too(run, tmp_path):
         one, two = ((tmp_path / k / name) for k in ("one", "two"))
         assert one.exists() == two.exists()
         assert not one.exists() or one.read_bytes() == two.read_bytes()
+
+
+def test_a_lie_changes_the_record_and_not_the_truth(run, tmp_path):
+    small = {"dish_prisms": 20, "interval_s": 14.0, "again": 0.5, "seed": 5}
+    lies = ("monument ZY105 1 0 0", "mmhg WX1")
+    status, _, complained = run("night", tmp_path / "one", *SMALL, "--lie", lies[0], "--lie", lies[1])
+    assert status == 0, complained
+    catseye.night(tmp_path / "two", **small, lies=lies)
+    catseye.night(tmp_path / "honest", **small)
+    for name in ("truth.json", "weather.csv", "monuments/ZY105.toml", "frames.npy"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    one, honest = (json.loads((tmp_path / k / "truth.json").read_text()) for k in ("one", "honest"))
+    assert (one.pop("lies"), honest.pop("lies")) == (["monument ZY105 1 0 0", "mmhg WX1"], [])
+    assert one == honest
+    x = [tomllib.loads((tmp_path / k / "monuments" / "ZY105.toml").read_text())["x_mm"] for k in ("one", "honest")]
+    assert x[0] - x[1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_an_unknown_lie_is_refused_in_one_line_and_nothing_is_written(run, tmp_path):
+    status, _, complained = run("night", tmp_path / "one", *SMALL, "--lie", "rumour ZY105")
+    assert status == 1
+    assert "'rumour ZY105': unknown kind (expected one of target, monument" in complained
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_holds_something_and_numbers_beyond_the_limits_are_refused(run, tmp_path):

@@ -284,3 +284,32 @@ def test_millimetres_typed_as_metres_are_refused_or_doubtful_with_both_readings(
     assert verdict["word"] == "doubtful"
     assert "in millimetres it would be 0, 0, 5 m" in verdict["why"]
     assert answer(catseye, *NOTES, "--to=0,0,50")[0]["verdict"]["word"] == "good"
+
+
+def test_a_ranger_of_a_site_points_at_a_point_of_the_reflector(catseye):
+    found = answer(catseye, "--site", "gbt", "--ranger", "ZY115", "--frame", "reflector", "--posture", "145.3,30",
+                   "--to=0,54,12.2")  # fmt: skip
+    [item] = found
+    assert set(item) >= KEYS | {"ranger", "frame", "posture", "in_frame"}
+    scan_point = np.array([-7.5943, -9.0847, 51.8391])  # m, reflector, as its record has it
+    assert item["range"] == pytest.approx(np.linalg.norm(scan_point - [0.0, 54.0, 12.2]), abs=1e-9)
+    np.testing.assert_allclose(item["to"], frames.ground_from_reflector(*np.radians([145.3, 30.0])).points(
+        [0.0, 54.0, 12.2]), atol=1e-9)  # fmt: skip
+    _, said, _ = catseye("point", "--site", "gbt", "--ranger", "ZY115", "--frame", "reflector", "--to=0,54,12.2")
+    assert "azimuth 145.3, elevation 30 deg" in said.replace("\n              ", " ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--site", "gbt"], "--site says nothing without --ranger"),
+        (["--site", "gbt", "--ranger", "ZY103", *NOTES[2:]], "--mirror does not go with --site and --ranger"),
+        (NOTES[:2], "--mirror is missing"),
+        ([*NOTES, "--frame", "reflector"], "--posture is missing"),
+        ([*NOTES, "--frame", "dish"], "not one of ground"),
+    ],
+)
+def test_a_ranger_that_is_not_one_is_wrong_usage(catseye, arguments, complaint):
+    status, _, said = catseye("point", *arguments, "--to=0,0,50")
+    assert status == 2
+    assert complaint in said.replace("\n", " ")

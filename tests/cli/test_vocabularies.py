@@ -1,6 +1,6 @@
 """The words that `--help` prints are those that the code beneath knows, in its order."""
 
-from typing import get_args
+from typing import get_args, get_type_hints
 
 import pytest
 import typer
@@ -16,16 +16,19 @@ from catseye.estimation.network import datum
 from catseye.estimation.quality.robustness import WEIGHTS
 from catseye.estimation.shapes import paraboloid, pose
 from catseye.gateways.journal.export import Form
-from catseye.geometry.antenna import pointing_series
+from catseye.geometry.antenna import pointing_series, rigid_telescope
 from catseye.optics import zernike
 from catseye.optics.retroreflector.kinds import registry
 from catseye.optics.safety import limits
 from catseye.ranger import addresses
+from catseye.records.laboratory.logger_sheet import PressureAt
+from catseye.records.site.nodal_result import UNITS
 from catseye.records.site.target import FrameName
 from catseye.reduction.calibrations import kinds
 from catseye.reduction.calibrations.field_report import FORMS
 from catseye.reduction.design import aim
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.network import positions
 from catseye.reduction.network.treatment import AdjustmentOptions
 from catseye.reduction.pose import pointing_offsets
 from catseye.reduction.pose import pose as pose_recipe
@@ -35,18 +38,22 @@ from catseye.reduction.surface.actuators import Travel
 from catseye.reduction.surface.prisms import Frame
 from catseye.service import settings, world
 from catseye.service.coordinator import Filter
+from catseye.signal.detection.frequency_plan import FrequencyPlan
 
 SOURCES = {
     "AIR_MODELS": air.MODELS,
     "AIR_MODEL": [ReductionSettings.air_model],
+    "PRESSURES_AT": get_args(PressureAt),
     "SOUND_MODELS": speed.MODELS,
     "THERMOMETRY_MODELS": reversed(speed.MODELS),
+    "OSCILLATORS": get_args(get_type_hints(FrequencyPlan)["oscillator"]),
     "EDITIONS": limits.EDITIONS,
     "REFLECTORS": registry.KINDS,
     "CALIBRATION_KINDS": kinds.KINDS,
     "REPORT_KINDS": FORMS,
     "DATUMS": datum.DATUMS,
     "NETWORK_WEIGHTS": [name for name in WEIGHTS if name != "geman_mcclure"],  # whose constant is our own choice
+    "LOCATE_METHODS": positions.METHODS,
     "DESIGN_CRITERIA": aim.CRITERIA,
     "POSE_GROUPS": pose_recipe.GROUPS,
     "POSE_FRAMES": pose_recipe.FRAMES,
@@ -57,8 +64,10 @@ SOURCES = {
     "NUMBERINGS": zernike.NUMBERINGS,
     "PRISM_FRAMES": get_args(Frame),
     "TRAVELS": get_args(Travel),
+    "TELESCOPE_FRAMES": rigid_telescope.FRAMES,
     "SERIES_FRAMES": reversed(get_args(FrameName)),
     "OWN_FUNCTIONS": get_args(Own),
+    "NODE_UNITS": tuple(UNITS),
     "CONDITIONS": world.CONDITIONS,
     "MODES": get_args(Mode),
     "FILTERS": settings.FILTERS,

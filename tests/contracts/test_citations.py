@@ -43,3 +43,14 @@ def test_entries_say_what_they_are():
         assert len(source.title) > 20, key
         assert source.locator, key
         assert source.used, key
+
+
+def test_the_use_of_both_documents_names_every_package_that_cites_them():
+    """A reader of the references finds each formula's package; doors and writers follow from these."""
+    for key in ("PARKER04", "GOLDMAN00"):
+        named = re.findall(r"`([a-z_.]+)`", SOURCES[key].used)
+        modules = [where.removesuffix(".py").replace("/", ".") for where in cited()[key]]
+        formulas = [module for module in modules if not module.startswith(("api.", "gateways.", "cli."))]
+        assert len(formulas) > 20, key
+        lacking = [m for m in formulas if not any(m == name or m.startswith(f"{name}.") for name in named)]
+        assert not lacking, f"{key}: name their package in `used`: {', '.join(lacking)}"

@@ -20,10 +20,10 @@ OTHER_WRITERS = {  # what writes rows without a `Table`
     "gateways/writers/columns.py",
     "gateways/writers/written.py",  # `csv_text`
     "api/result.py",  # a QTable of any result, its units in the header
+    "gateways/air/weather_objects.py",  # rows of records
     "gateways/journal/campaign.py",  # rows of records
     "records/site/folder.py",
     "simulator/night/sheets.py",
-    "simulator/laboratory/refractometer.py",  # readings, as an instrument writes them
 }
 TABLES = tables()
 
@@ -141,16 +141,24 @@ BASELINE = EXAMPLES / "baselines" / "busselton"
 HEIGHTS = ["--heights", BASELINE / "pillar-heights.csv"]
 PANELS = EXAMPLES / "panels"
 ACOUSTIC = EXAMPLES / "acoustic"
+ZP103 = EXAMPLES / "night-01" / "mirrors" / "ZP103.toml"
 COMMANDS = {  # directory -> the command that writes it; night: of the one before
     "night": ["reduce", EXAMPLES / "night-01"],
     "budget": ["budget", EXAMPLES / "night-01", "DP012"],
     "network": ["adjust", NETWORK],
     "epochs": ["adjust", NETWORK, NETWORK],
+    "positions": ["locate", EXAMPLES / "positions" / "stations.csv", EXAMPLES / "positions" / "three-ranges.csv",
+                  "--method", "averaging", "--near=0,0,30", "--both"],
+    "movements": ["movements", EXAMPLES / "movements" / "before.csv", EXAMPLES / "movements" / "after.csv", "--points",
+                  EXAMPLES / "movements" / "points.csv", "--constraints", EXAMPLES / "movements" / "constraints.toml"],
     "plan": ["plan", NETWORK, "--budget-s", 600, "--shot-s", 5],
     "design": ["design", EXAMPLES / "designs" / "structure-60m.toml", "--steps", 2, "--exchanges", 0, "--runs", 100,
                "--map-side", 3, "--vary", "rangers from 8 to 9 between 5 and 45 m"],
     "baseline": ["baseline", BASELINE / "ts30-baseline-observations.csv", *HEIGHTS],
     "acoustic": ["acoustic", ACOUSTIC / "evening-1.wav", "--sheet", ACOUSTIC / "evening.toml"],
+    "array": ["acoustic-field", ACOUSTIC / "array-stations.csv", ACOUSTIC / "array-times.csv"],
+    "weather": ["weather", EXAMPLES / "weather" / "tower.dat"],
+    "path": ["path", EXAMPLES / "weather" / "stations.csv", "--start=0,0,3", "--end=100,0,40"],
     "refractometer": ["refractometer", EXAMPLES / "refractometer" / "path-a.csv"],
     "beam": ["beam", EXAMPLES / "beams" / "head.toml", "--distance-m", 120],
     "panels": ["panels", PANELS / "as-found.csv", "--instrument", PANELS / "tool.toml", "--layout", "gbt",
@@ -158,20 +166,40 @@ COMMANDS = {  # directory -> the command that writes it; night: of the one befor
     "triplet": ["triplet", EXAMPLES / "triplets" / "TR99.toml"],
     "fit": ["pointing", "fit", EXAMPLES / "pointing" / "stars.dat"],
     "track": ["pointing", "track", "--tilts", EXAMPLES / "pointing" / "tilts.csv", "--harmonics", 3],
+    "bent": ["model", "displace", EXAMPLES / "structural-model" / "telescope.toml", "--posture", "145,45",
+             "--site", EXAMPLES / "sites" / "gbt"],
+    "chosen": ["model", "choose", EXAMPLES / "structural-model" / "telescope.toml",
+               "--site", EXAMPLES / "sites" / "gbt",
+               "--count", 2, "--posture", "0,45", "--free", "feed_arm:turn_x"],
+    "imported": ["model", "import", EXAMPLES / "structural-model" / "telescope.toml",
+                 EXAMPLES / "finite-elements" / "elevations.csv",
+                 "--nodes", EXAMPLES / "finite-elements" / "nodes.csv",
+                 "--axes=-y,x,z", "--origin=0,54.839108,-4.99999"],
+    "refined": ["model", "fit", EXAMPLES / "structural-model" / "telescope.toml",
+                EXAMPLES / "structure" / "epochs.csv"],
+    "servo": ["servo", "identify", EXAMPLES / "servo" / "moves.csv"],
+    "scan": ["scan", "fit", EXAMPLES / "scans" / "azimuth.csv", "--mirror", ZP103],
     "pose": ["pose", "night", "--site", EXAMPLES / "night-01", "--group", "dish", "--frame", "reflector"],
     "surface": ["surface", "night", "--taper-db", 13, "--frequency-ghz", 86],
+    "phase": ["phase", EXAMPLES / "buffers" / "clipped.csv"],
+    "cycles": ["cycles", EXAMPLES / "cycles" / "three-frequencies.csv"],
     "change": ["surface", "night", "night"],
 }  # fmt: skip
-WITHOUT_TABLES = {"certificate", "plot"}  # commands with --out that write a page or a figure
+WITHOUT_TABLES = {"certificate", "frequencies", "plot", "stray"}  # commands with --out that write a page or a figure
 ELSEWHERE = {
+    "convert",
     "demo",
     "export",
+    "follow",
     "query",
     "replay",
     "simulate",
     "structure",
+    "subreflector",
+    "track",
     "trends",
-}  # `demo` is `reduce`; others: see tests/gateways
+    "triplets",
+}  # `demo` is `reduce`; `triplets` writes what `save` writes of any result; others: see tests/gateways
 
 
 @pytest.mark.slow

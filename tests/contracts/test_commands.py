@@ -75,7 +75,10 @@ def test_reduce_gives_one_object_on_stdout_and_nothing_on_stderr(reduced):
 
 def test_reduce_writes_every_file_and_leaves_no_neighbour(reduced):
     _, out = reduced
-    files = "coordinates.csv coordinates.json pose.json provenance.json ranges.csv report.html results.fits surface.csv"
+    files = (
+        "contradictions.csv coordinates.csv coordinates.json pose.json provenance.json ranges.csv records.csv "
+        "report.html results.fits surface.csv"
+    )
     assert sorted(path.name for path in out.iterdir()) == files.split()
     assert [path.name for path in out.parent.iterdir()] == ["out"]
 
@@ -249,7 +252,11 @@ def test_quick_answers_spare_the_heavy_imports(arguments):
 VERBS = ("plot",)  # groups whose name is the verb
 BUILTINS = {"help": "topic"}  # command whose name is one of Python's -> its function
 OF_THE_TERMINAL = {"json", "out", "quiet", "strict", "page", "threads"}
-OTHER_NAMES = {"point": {"file": "to"}}  # command -> its option: the argument that takes its value
+OTHER_NAMES = {  # command -> its option: the argument that takes its value
+    "point": {"file": "to"},
+    "convert": {"point": "points", "file": "points"},
+    "track": {"to": "points", "file": "points"},
+}
 OF_SEVERAL = {  # command that takes one input or several -> function for several
     "reduce": "reduce_nights",
     "replay": "replay_journals",

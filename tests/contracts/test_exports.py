@@ -56,3 +56,26 @@ def test_the_page_of_the_commands_names_each_function_and_no_other():
     [paragraph] = [part for part in text.split("\n\n") if part.startswith("A command is one call of `import catseye`")]
     names = set(re.findall(r"`(?:catseye\.)?([a-z]\w*)(?:\([^`]*\))?`", paragraph))
     assert names - {"verdict", "to_table", "to_object"} == {name for names in catseye.FACE.values() for name in names}
+
+
+def test_names_that_programs_beside_the_package_import_are_there():
+    """Studies, benchmarks, tools, examples and the documentation's programs: none runs in these tests as a whole."""
+    missing = []
+    for folder in ("studies", "benchmarks", "tools", "examples", "docs"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "catseye":
+                    module = import_module(node.module)
+                    missing += [f"{path.name}: {node.module}.{a.name}" for a in node.names if not is_in(module, a.name)]
+    assert missing == []
+
+
+def is_in(module, name):
+    """True for a name of a module, or a module of a package."""
+    if hasattr(module, name):
+        return True
+    try:
+        import_module(f"{module.__name__}.{name}")
+    except ModuleNotFoundError:
+        return False
+    return True

@@ -18,7 +18,7 @@ HISTORY: dict[tuple[str, str], str] = {}
 
 FILE = re.compile(r"(?<![\w/.-])(?:[\w-]+/)+[\w-]+\.py\b")
 ADDED = re.compile(r"^```\{code-block\} python\n:caption: (\S+)$", re.MULTILINE)  # by a walkthrough
-DOTTED = re.compile(rf"`((?:catseye|{'|'.join(ROOMS)})(?:\.[A-Za-z_]\w*)+)(?=[`(\[ ])")
+DOTTED = re.compile(rf"`((?:catseye|{'|'.join(ROOMS)})(?!\.csv`)(?:\.[A-Za-z_]\w*)+)(?=[`(\[ ])")
 COMMAND = re.compile(r"(?:`|bin/)catseye ([a-z][a-z-]*)")
 JOINED = re.compile(r'@app\.command\((?:"([\w-]+)")?.*?\ndef (\w+)|\bapp\.add_typer\(\w+, name="([\w-]+)"', re.DOTALL)
 
@@ -101,7 +101,7 @@ def commands() -> set[str]:
     found = set()
     for path in (PACKAGE / "cli").rglob("*.py"):
         for given, function, group in JOINED.findall(path.read_text(encoding="utf-8")):
-            found.add(given or group or function.strip("_"))
+            found.add(given or group or function.strip("_").replace("_", "-"))  # as typer names it
     return found
 
 

@@ -18,8 +18,6 @@ PACKAGE = ROOT / "src" / "catseye"
 FIGURES = {"Figure", "Svg", "dict[str, Figure]", "dict[str, CaptionedFigure]", "tuple[Svg, dict[str, Any]]"}
 STUDIES = {  # figures that no command draws
     "gateways/steering/servo_figures.py: step_figure",
-    "gateways/steering/tracking_figures.py: search_figure",
-    "gateways/steering/tracking_figures.py: visibility_figure",
 }
 
 
@@ -114,6 +112,19 @@ def test_a_block_that_fails_is_told_with_its_line(tmp_path):
     _, warnings = build(tmp_path, {"index.md": f"# Page\n\n{block}"}, extensions=("gallery",))
     assert "index.md:3: " in warnings
     assert "none.toml" in warnings
+
+
+def test_the_page_of_chapter_8_draws_its_list():
+    """Every item of [PARKER04] chapter 8 but the converter's timing; each block has a line for each figure."""
+    blocks = blocks_of((PAGE.parent / "chapter-8.md").read_text(encoding="utf-8"))
+    with GalleryCalls() as calls:
+        drawn = [name for block in blocks for name in calls.figures(block)[1]]
+    kinds = ["signature", "recording", "correlation", "temperature"]
+    sound = [f"ZY103 to ZEG41040L: {kind}" for kind in kinds]
+    assert drawn == [
+        *("acquired", "night", "slope", "readings", "readings", "return", "angles", "azimuth", "elevation"),
+        *sound,
+    ]
 
 
 @pytest.mark.slow  # a minute: every figure is drawn

@@ -1,5 +1,7 @@
 """Tables of docs/evidence/how-good.md from the measured data."""
 
+from hostile.outcome import OUTCOMES
+from hostile.rows import HONEST
 from repository import ROOT
 
 PAGE = ROOT / "docs" / "evidence" / "how-good.md"
@@ -52,17 +54,25 @@ def nights_text(data):
 
 
 def records_text(data):
-    """Table of wrong records."""
-    head = ["wrong record", "named", "covered", "noticed", "silent", "mean square", "largest shift"]
-    rows = []
-    for r in data["wrong_records"]:
-        sizes = ["no result", ""]
-        if r["mean_square"] is not None:
-            sizes = [f"{r['mean_square']:.1f}", f"{1e3 * r['largest_shift_m']:.2f} mm"]
-        rows.append([r["record"], *(str(r[key]) for key in head[1:5]), *sizes])
-    nights = sum(data["wrong_records"][0][key] for key in head[1:5])
-    refused = sum(r["refused"] for r in data["wrong_records"])
-    return f"{table(head, rows)}\n\n{nights} nights of 60 prisms for each record; {refused} of them were refused."
+    """Table of hostile nights."""
+    head = ["what is wrong", "sizes", "nights", *OUTCOMES, "accused", "mean square, class"]
+    rows = [r for r in data["wrong_records"] if r["row"] != HONEST]
+    (honest,) = (r for r in data["wrong_records"] if r["row"] == HONEST)
+    body = []
+    for r in rows:
+        sizes = ", ".join(f"{size:g}" for size in r["sizes"] if size)
+        square = "" if r["mean_square"] is None else f"{r['mean_square']:.1f}, {r['worst_class']}"
+        counts = [str(r[key] or "") for key in ("nights", *OUTCOMES, "accused")]
+        body.append([r["row"], f"{sizes} {r['unit']}".strip(), *counts, square])
+    sums = {key: sum(r[key] for r in rows) for key in ("nights", *OUTCOMES, "accused", "refused")}
+    body.append(["all", "", *(str(sums[key]) for key in ("nights", *OUTCOMES, "accused")), ""])
+    answered = sum(sums[word] for word in OUTCOMES[:3])
+    return (
+        f"{table(head, body)}\n\n"
+        f"{answered} of {sums['nights']} hostile nights are named, covered or listed; {sums['refused']} were refused. "
+        f"Of {honest['nights']} nights without a lie {honest['alarmed']} raised an alarm, {honest['accused']} accused "
+        f"a record, and {100.0 * honest['listed_share']:.1f} % of their points were listed as unchecked."
+    )
 
 
 def networks_text(data):

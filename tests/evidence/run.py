@@ -2,7 +2,7 @@
 
 PYTHONPATH=tests python tests/evidence/run.py            make evidence
     --nights 60:40 200:40 400:40                          sizes of the dish and numbers of nights
-    --records 5                                           nights with wrong records
+    --records 5                                           nights of each kind of wrong record
     --show                                                print the tables, write nothing
 """
 
@@ -56,7 +56,7 @@ def measure(sizes, records):
             "networks": networks.compared(),
             "variance_factors": networks.factors(),
             "baseline": baselines.compared(),
-            "wrong_records": wrong_records.measured(records, where, say),
+            "wrong_records": wrong_records.measured(records, say),
             "nights": [nights.measured(prisms, count, where / str(prisms), say) for prisms, count in sizes],
         }
     run = {
@@ -86,7 +86,7 @@ def main():
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     usual = [(60, 20), (200, 4)]
     parser.add_argument("--nights", nargs="+", type=size_of, default=usual, metavar="PRISMS:NIGHTS", help="60:20 200:4")
-    parser.add_argument("--records", type=int, default=3, help="nights with wrong records, 1 or more; 3")
+    parser.add_argument("--records", type=int, default=3, help="nights of each kind of wrong record, 1 or more; 3")
     parser.add_argument("--show", action="store_true", help="print the tables, write nothing")
     options = parser.parse_args()
     if options.records < 1:

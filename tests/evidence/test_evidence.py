@@ -6,6 +6,8 @@ import re
 import pytest
 
 from evidence import baselines, networks, nights, page, wrong_records
+from hostile.outcome import OUTCOMES, outcome
+from hostile.rows import NAMES
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +34,13 @@ def test_the_data_name_their_run(data):
     assert run["processor_s"] > 10.0
     assert {n["prisms"] for n in data["nights"]} >= {60, 200}
     assert all(n["seeds"][0] == nights.FIRST_SEED[n["prisms"]] for n in data["nights"])
-    assert [row["record"] for row in data["wrong_records"]] == list(wrong_records.CASES)
+    assert [row["row"] for row in data["wrong_records"]] == list(NAMES)
+    for row in data["wrong_records"]:
+        assert (
+            sum(row[word] for word in OUTCOMES)
+            == row["nights"]
+            == len(wrong_records.nights_of(row["row"], data["wrong_records"][0]["nights"]))
+        )
 
 
 def test_a_page_without_a_place_for_a_table_is_refused(data):
@@ -61,7 +69,7 @@ def test_the_first_night_and_two_wrong_records_are_measured_again(data, tmp_path
     (small,) = [n for n in data["nights"] if n["prisms"] == 60]
     again = nights.one(nights.FIRST_SEED[60], 60, tmp_path / "first")
     assert again["mean"] == pytest.approx(small["first_night"], rel=0.05)
-    night = wrong_records.night_of(wrong_records.FIRST_SEED, tmp_path)
-    kept = {row["record"]: row["first_night"] for row in data["wrong_records"]}
-    for name in ("humidity as a fraction", "heights of all triplets 0.3 mm too large"):
-        assert wrong_records.outcome(name, *night)[0] == kept[name]
+    kept = {row["row"]: row["first_night"] for row in data["wrong_records"]}
+    for name in ("humidity as a fraction", "d0 in metres"):
+        again = outcome(wrong_records.nights_of(name, 1)[0])
+        assert {"lies": list(again.case.lies), "word": again.word} == kept[name]

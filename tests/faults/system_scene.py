@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from catseye.clock import SystemClock
-from catseye.coordinator.clients.samplers import rows_of
 from catseye.coordinator.clients.server import PUSHED
 from catseye.coordinator.journal.reader import JournalReader
 from catseye.coordinator.journal.replay import replay
 from catseye.coordinator.journal.sameness import Sameness
+from catseye.coordinator.samplers.rings import rows_of
 from catseye.ranger.addresses import ranger_addresses
 from catseye.records.site.folder import read_site
 from catseye.reduction.live.live import Live

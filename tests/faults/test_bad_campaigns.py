@@ -231,6 +231,19 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
         set_cell("weather.csv", 3, "temperature_c", "285.15"),
         "weather.csv: row 3, temperature_c = 285.15 looks like kelvin",
     ),
+    "temperature in degrees Fahrenheit": (
+        set_cell("weather.csv", 3, "temperature_c", "95.0"),
+        "weather.csv: row 3, temperature_c = 95.0 looks like degrees Fahrenheit",
+    ),
+    "pressure in inches of mercury": (
+        set_cell("weather.csv", 3, "pressure_mb", "27.49"),
+        "weather.csv: row 3, pressure_mb = 27.49 looks like inches of mercury",
+    ),
+    "pressure in mmHg": (
+        set_cell("weather.csv", 3, "pressure_mb", "432.0"),
+        "weather.csv: row 3, pressure_mb = 432.0 looks like mmHg",
+    ),
+    "offset in inches": (set_key(MIRROR, "d0_mm", "7.11"), "d0_mm = 7.11 looks like inches"),
     # types and keys
     "text for a number": (set_key(MIRROR, "d0_mm", '"180.5"'), "d0_mm = '180.5' (expected a number)"),
     "boolean for a number": (set_key(MIRROR, "d0_mm", "true"), "d0_mm = True (expected a number)"),

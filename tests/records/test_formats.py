@@ -27,6 +27,7 @@ from catseye.records.site.pointing_model import PointingModel
 from catseye.records.site.site import SiteRecord
 from catseye.records.site.solids import Solids
 from catseye.records.site.structural_model import StructuralModel
+from catseye.records.site.subreflector import SubreflectorMount
 from catseye.records.site.target import BenchmarkRow, FeedArm, Targets
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.air.refractometer_night import PathSheet
@@ -58,6 +59,7 @@ RECORDS: dict[str, type[Record]] = {
     "laboratory-1.toml": LaboratoryRecord,
     "job-1.toml": CertificateJob,
     "design-1.toml": DesignLayout,
+    "subreflector-1.toml": SubreflectorMount,
 }
 TABLES: dict[str, tuple[type[Record], int]] = {
     "benchmarks-1.csv": (BenchmarkRow, 6),

@@ -272,8 +272,5 @@ def test_a_point_where_good_shots_lose_against_a_foreign_one_claims_little(tmp_p
     """Found among 124 nights: three of five go, the two that stay check each other no more; so they go too."""
     night = any_night(2307)
     coordinates = reduce_epoch(read_campaign(write_night(night, tmp_path / "night"))).coordinates
-    row = coordinates.index("DP043")
-    error = coordinates.x[row] - night.truth.points["DP043"]
-    u = np.sqrt(np.diag(coordinates.block(["DP043"])))
-    assert np.all(np.abs(error) < 4.0 * u)
-    assert u.max() > 1e-3
+    assert "DP043" in coordinates.unmeasured  # its typed position alone is no result
+    assert "DP043" not in coordinates.points

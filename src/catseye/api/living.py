@@ -6,14 +6,14 @@ import os
 import signal
 from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from catseye.aliases import Progress
 from catseye.api.journal import journal_place, run_of
 from catseye.api.live.limits import within
 from catseye.api.live.serving import MOTION, OrderOptions, coordinator_orders, mjd_start, read_site_of, twin_options
-from catseye.api.reading import place_of
+from catseye.api.reading import place_of, with_structure
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from catseye.coordinator.journal.reader import JournalReader
     from catseye.gateways.writers.passage import Passage
     from catseye.records.site.folder import SiteFolder
+    from catseye.records.site.structural_model import StructuralModel
     from catseye.service.replay import ReplayOutcome
     from catseye.service.simulation import Simulation
     from catseye.service.world import TwinWords
@@ -88,10 +89,13 @@ def simulate(
     motion: str = MOTION,
     conditions: str = "night",
     faults: Sequence[str] = (),
+    structure: "str | os.PathLike[str] | StructuralModel | None" = None,
     start_mjd: Annotated[Any, In("mjd", one=True, text=True)] = NIGHT,
     cold: bool = False,
     journal: "str | os.PathLike[str] | None" = None,
     keep_buffers: bool = True,
+    archive_samplers: "str | os.PathLike[str] | None" = None,
+    archive_every_s: Annotated[Any, In("s", one=True)] = 60.0,
     round_s: Annotated[Any, In("s", one=True)] = 10.0,
     filter_: str = "random_walk",
     drop: Sequence[str] = (),
@@ -111,10 +115,14 @@ def simulate(
                      "table FILE"
     conditions       the twin's weather: "night", "windy-day" or "dewy-night"
     faults           "KIND WHOM [START [END [SIZE]]]", as docs/living.md has them
+    structure        structural model that bends the twin's telescope, known to the coordinator; the site's own
+                     structural-model.toml without
     start_mjd        UTC at the twin's start, MJD or text
     cold             True for rangers just powered on: half a minute more
     journal          place of its journal: a new SQLite file, or postgresql://...; None for none
     keep_buffers     False to store no samples: no replay is exact then
+    archive_samplers directory for FITS files of the coordinator's samplers, written while it runs; None for none
+    archive_every_s  span of such a file, s, 5 to 3600
     round_s          length of a round, s, 2 to 600
     filter_          "random_walk" or "constant_velocity", from epoch to epoch
     drop             rangers to leave out
@@ -133,14 +141,20 @@ def simulate(
         raise ArgumentError("minutes = 0 never ends (expected above 0, or end_on_signals)", "minutes", "end_on_signals")
     if not fast and not isinstance(site, str | os.PathLike):
         raise ArgumentError("site: the twin's process reads it (expected a folder, or fast)", "site", "fast")
+    if not fast and structure is not None and not isinstance(structure, str | os.PathLike):
+        raise ArgumentError("structure: the twin's process reads it (expected a file, or fast)", "structure", "fast")
     within("port_base", port_base, 0, 65_000)
     world = _world(mjd_start(start_mjd, NIGHT), twin_options(seed, motion, conditions, faults), fast)
+    if isinstance(structure, str | os.PathLike):
+        world = replace(world, structure=str(place_of(structure)))
     orders: OrderOptions = {
         "drop": drop,
         "round_s": round_s,
         "filter_": filter_,
         "journal": journal,
         "keep_buffers": keep_buffers,
+        "archive_samplers": archive_samplers,
+        "archive_every_s": archive_every_s,
         "port": 0 if port is None and (fast or port_base == 0) else port,
     }
     from catseye.service.display import view_of
@@ -153,7 +167,7 @@ def simulate(
         from catseye.service.simulation import Simulation
 
         given = coordinator_orders(**orders)
-        records = read_site_of(site) if isinstance(site, str | os.PathLike) else site
+        records = with_structure(read_site_of(site) if isinstance(site, str | os.PathLike) else site, structure)
         made.append(Simulation(site=records, world=world, orders=given, minutes=minutes, view=view, warm=not cold))
         return made[0]
 

@@ -1,7 +1,7 @@
 """`fit_pointing` and `predict_pointing`: the antenna's pointing series."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,10 +26,13 @@ if TYPE_CHECKING:
     from catseye.geometry.antenna.pointing_series import PointingSeries
     from catseye.records.laboratory.star_offsets import StarOffsets
     from catseye.records.network.written_pose import WrittenPose
+    from catseye.records.site.folder import SiteFolder
     from catseye.records.site.pointing_model import NamedSeries, PointingModel
+    from catseye.records.site.structural_model import StructuralModel
     from catseye.reduction.pose.corrections import PointingObservations
     from catseye.reduction.pose.prediction import PointingPrediction
     from catseye.reduction.pose.series_comparison import PointingFindings
+    from catseye.reduction.structure.beam import BeamOffset
 
 ZENITH_DEG = 89.999  # nearer to the zenith azimuth is not defined
 AXES = ("azimuth_cos_e", "elevation")
@@ -163,6 +166,9 @@ def fit_pointing(
     terms: Sequence[str] | None = None,
     u_arcsec: Annotated[Any, In("arcsec", one=True)] = None,
     reject: bool = False,
+    structure: "str | os.PathLike[str] | StructuralModel | None" = None,
+    site: "str | os.PathLike[str] | SiteFolder | None" = None,
+    temperature_c: Annotated[Any, In("deg_C", one=True)] = None,
 ) -> SeriesResult:
     """Pointing series by least squares, with covariance and what it cannot tell apart.
 
@@ -171,6 +177,9 @@ def fit_pointing(
     terms      to fit, of "IA", "IE", "CA", "NPAE", "AW", "AN", "HZCZ", "HZSZ"; all without
     u_arcsec   of each coordinate of a star; from the scatter without
     reject     leave out observations with |w| beyond 4, one by one
+    structure  structural model: the series is that of what it leaves, with the same argument for `predict_pointing`
+    site       its paraboloid, with `structure`
+    temperature_c   of the structure, with `structure`; the model's reference without
 
     Raises ArgumentError for invalid terms or u_arcsec, InputError for files that cannot be used, EstimationError where
     the observations do not determine the terms.
@@ -180,6 +189,7 @@ def fit_pointing(
     ('good', 8, True)
     """
     from catseye.geometry.antenna.pointing_series import TERMS
+    from catseye.reduction.pose.corrections import PointingObservations
     from catseye.reduction.pose.series_comparison import find_pointing
 
     chosen = list(TERMS) if terms is None else list(terms)
@@ -188,9 +198,14 @@ def fit_pointing(
     if u_arcsec is not None and not (np.isfinite(u_arcsec) and u_arcsec > 0.0):
         raise ArgumentError(f"u_arcsec = {u_arcsec} is not above zero", "u_arcsec")
     observations, read = _observations(files)
+    reference = None if against is None else _reference(against)
+    bend = _bend(structure, site, temperature_c)
+    if bend is not None:
+        observations = bend.subtracted(observations)
+        reference = bend.subtracted(reference) if isinstance(reference, PointingObservations) else reference
     findings = find_pointing(
         observations,
-        None if against is None else _reference(against),
+        reference,
         terms=chosen,
         u=None if u_arcsec is None else u_arcsec * ARCSECOND,
         reject=reject,
@@ -212,9 +227,69 @@ def fit_pointing(
             "u_arcsec": u_arcsec,
             "reject": reject,
             "against": None if named is None else str(named),
+            "structure": None if bend is None else bend.title,
         },
-        read=read,
+        read=read if bend is None else (*read, *bend.read),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _StructuralBend:
+    """Beam's offset by a structural model, for any directions.
+
+    offsets   function of azimuth and elevation (n,), rad
+    title     of the model
+    hashes    SHA-256 of each file read, by its name
+    read      files and folders that were read
+    """
+
+    offsets: "Callable[[np.ndarray, np.ndarray], BeamOffset]"
+    title: str
+    hashes: dict[str, str]
+    read: tuple[Path, ...]
+
+    def subtracted(self, observations: "PointingObservations") -> "PointingObservations":
+        """Observations without the correction by the model."""
+        bent = self.offsets(observations.azimuth, observations.elevation)
+        return replace(
+            observations,
+            correction=observations.correction - bent.correction,
+            hashes=observations.hashes | self.hashes,
+        )
+
+    def added(self, prediction: "PointingPrediction") -> "PointingPrediction":
+        """Prediction with the correction by the model."""
+        from catseye.reduction.pose.prediction import with_structure
+
+        shape = prediction.azimuth.shape
+        bent = self.offsets(prediction.azimuth.ravel(), prediction.elevation.ravel())
+        covariance = bent.covariance[:, :2, :2].reshape(*shape, 2, 2)
+        return with_structure(prediction, bent.correction.reshape(*shape, 2), covariance)
+
+
+def _bend(structure: Any, site: Any, temperature_c: float | None) -> _StructuralBend | None:
+    """Structural model's bend of the beam; None without a model, ArgumentError for half of the arguments."""
+    if structure is None:
+        for name, value in (("site", site), ("temperature_c", temperature_c)):
+            if value is not None:
+                raise ArgumentError(f"{name} needs structure, a structural model", name, "structure")
+        return None
+    if site is None:
+        raise ArgumentError("structure needs site, whose paraboloid counts", "structure", "site")
+    from catseye.api.telescope.displacement import antenna_from, site_from
+    from catseye.geometry.antenna.deformation import TelescopePosture
+    from catseye.reduction.pose.pointing_offsets import site_aperture
+    from catseye.reduction.structure.beam import model_beam
+
+    antenna, hashes, read = antenna_from(structure)
+    records, more = site_from(site)
+    warm = antenna.record.reference_temperature_c if temperature_c is None else float(temperature_c)
+    aperture = site_aperture(records)
+
+    def offsets(azimuth: np.ndarray, elevation: np.ndarray) -> "BeamOffset":
+        return model_beam(antenna, aperture, TelescopePosture(azimuth, elevation, warm))
+
+    return _StructuralBend(offsets, antenna.record.title, hashes | records.hashes, (*read, *more))
 
 
 def _observations(files: Any) -> "tuple[PointingObservations, tuple[Path, ...]]":
@@ -320,12 +395,19 @@ def predict_pointing(
     elevation_deg: Annotated[Any, In("deg")],
     *,
     model: "str | os.PathLike[str] | PointingModel | PointingSeries" = "published",
+    structure: "str | os.PathLike[str] | StructuralModel | None" = None,
+    site: "str | os.PathLike[str] | SiteFolder | None" = None,
+    temperature_c: Annotated[Any, In("deg_C", one=True)] = None,
 ) -> PredictionResult:
     """Predict the encoders' corrections for directions on the sky.
 
     azimuth_deg     on the sky, clockwise from north, -540 to 540; broadcasts with
     elevation_deg   on the sky, -5 to 89.999
     model           "published", MODEL.toml (`SeriesResult.save_model`) or its record, or a series
+    structure       structural model, whose correction is added: the series must be that of what it leaves
+                    (`fit_pointing` with `structure`), else gravity counts twice
+    site            its paraboloid, with `structure`
+    temperature_c   of the structure, with `structure`; the model's reference without
 
     Raises ArgumentError for a direction outside, InputError for a model that cannot be used.
 
@@ -342,8 +424,12 @@ def predict_pointing(
     ):
         for value in values[~((values >= low) & (values <= high))].ravel()[:1]:
             raise ArgumentError(f"{name} = {value:g} is not {low:g} to {high:g} degrees", name)
+    bend = _bend(structure, site, temperature_c)
     series, read = _series(model)
     prediction = predict(series, azimuth * DEGREE, elevation * DEGREE)
+    hashes = series.hashes
+    if bend is not None:
+        prediction, read, hashes = bend.added(prediction), (*read, *bend.read), hashes | bend.hashes
     return PredictionResult(
         verdict=prediction.verdict,
         correction=prediction.correction,
@@ -351,7 +437,7 @@ def predict_pointing(
         covariance=prediction.covariance,
         encoders=np.stack(prediction.encoders, axis=-1),
         prediction=prediction,
-        hashes=series.hashes,
+        hashes=hashes,
         read=read,
     )
 

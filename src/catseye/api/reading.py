@@ -2,9 +2,11 @@
 
 import os
 import tomllib
+from dataclasses import replace
+from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from catseye.errors import InputError
 
@@ -15,8 +17,10 @@ if TYPE_CHECKING:
     from catseye.records.network.solved_points import SolvedPoints
     from catseye.records.night.campaign import Campaign
     from catseye.records.site.folder import SiteFolder
+    from catseye.records.site.structural_model import StructuralModel
     from catseye.records.topics.pages import Topic
 
+    Site = TypeVar("Site", bound=SiteFolder)
     Loaded: TypeAlias = Campaign | SiteFolder | ObservationNetwork | SolvedPoints | Record | JournalReader
 
 DATABASES = ("postgresql://", "postgres://", "sqlite://")
@@ -73,6 +77,25 @@ def topic(name: str) -> "Topic":
     from catseye.records.topics.pages import read_topic
 
     return read_topic(name)
+
+
+def structure_of(structure: "str | os.PathLike[str] | StructuralModel") -> "StructuralModel":
+    """The structural model itself, read where a path or a name was given."""
+    from catseye.records.site.structural_model import StructuralModel, read_structural_model
+
+    return structure if isinstance(structure, StructuralModel) else read_structural_model(place_of(structure))
+
+
+def with_structure(site: "Site", structure: "str | os.PathLike[str] | StructuralModel | None") -> "Site":
+    """Site or campaign whose telescope bends by a structural model; as it is with None."""
+    from catseye.records.site.folder import STRUCTURAL_MODEL
+    from catseye.records.site.structural_model import structural_model_toml
+
+    if structure is None:
+        return site
+    model = structure_of(structure)
+    digest = sha256(structural_model_toml(model).encode()).hexdigest()
+    return replace(site, structure=model, hashes=site.hashes | {STRUCTURAL_MODEL: digest})
 
 
 def place_of(source: "str | os.PathLike[str]", *, output: bool = False) -> Path:
@@ -180,6 +203,10 @@ TOML_READERS = {  # kind in `format` -> key that tells a file without one, and t
     "baseline": ("pillars", "catseye.records.laboratory.baseline.Baseline"),
     "panel-instrument": ("gauge", "catseye.records.panels.instrument.PanelInstrument"),
     "design": ("targets", "catseye.records.site.design_layout.DesignLayout"),
+    "movement-constraints": (
+        "still",
+        "catseye.records.network.movement_constraints.MovementConstraints",
+    ),
     "keep-out": ("boxes", "catseye.records.site.keep_out.KeepOut"),
     "solids": ("box", "catseye.records.site.solids.read_solids"),
     "beam": ("element", "catseye.records.site.beam.BeamTrain"),

@@ -53,6 +53,7 @@ UNITS_OF_NAMES = {  # ending of a name -> its unit as astropy spells it; the lon
     "_v": "V",
     "_volt": "V",
 }
+DIFFERENCES = ("u_", "warmer_")  # beginnings of names of intervals of temperature
 SPELLINGS = {  # as files and other programs write units, in lower case; some of them are others in astropy ("mb", "C")
     "deg_C": ("degc", "deg_c", "c", "celsius", "°c", "degree_celsius", "degrees_celsius", "degree celsius", "oc"),
     "K": ("k", "kelvin", "degk", "degree_kelvin"),
@@ -102,7 +103,7 @@ def unit_of_name(name: str) -> In | None:
     endings = [ending for ending in UNITS_OF_NAMES if name.endswith(ending) or name == ending[1:]]
     if not endings:
         return None
-    return In(UNITS_OF_NAMES[max(endings, key=len)], difference=name.startswith("u_") and name.endswith("_c"))
+    return In(UNITS_OF_NAMES[max(endings, key=len)], difference=name.startswith(DIFFERENCES) and name.endswith("_c"))
 
 
 def with_units(function: Callable[P, R]) -> Callable[P, R]:
@@ -227,6 +228,10 @@ def _stripped(value: Any, unit: In, name: str) -> Any:
 
 def _sequence(values: Any, unit: In, name: str) -> Any:
     """Numbers of a list, which may be nested; itself where all are plain. Raises InputError: units here and there."""
+    if any(isinstance(each, str) for each in values):
+        if unit.text:
+            return values
+        raise InputError(f"{name} holds text (expected {_wanted(unit)})")
     found = [each if isinstance(each, int | float | np.number) else _stripped(each, unit, name) for each in values]
     changed = [new is not old for new, old in zip(found, values, strict=True)]
     if not any(changed):

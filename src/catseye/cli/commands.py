@@ -21,19 +21,36 @@ if TYPE_CHECKING:
 
 ROOMS = (
     *("air.air", "air.sound", "air.refractometer", "air.acoustic", "networks", "explain", "calibrate", "certificate"),
-    *("baseline", "night", "optics.link", "point", "triplet", "optics.glass", "optics.beam", "optics.safety", "plot"),
+    *("air.weather", "air.path", "air.acoustic_field", "baseline", "night", "point", "triplet", "plot"),
+    *("optics.link", "optics.glass", "optics.beam", "optics.safety", "optics.stray"),
     *("live.zy", "live.ziy", "live.simulate", "live.serve", "live.view", "live.replay", "live.export", "live.journal"),
     *("telescope.pose", "telescope.surface", "telescope.pointing", "telescope.structure", "telescope.panels"),
+    *("telescope.frames", "telescope.tracking", "telescope.vibration", "telescope.model", "telescope.triplets"),
+    "telescope.subreflector",
     *("scale.archive", "scale.design", "scale.query", "scale.trends", "help"),
+    *("deformation.locate", "deformation.movements"),
+    *("detection.phase", "detection.frequencies", "detection.cycles"),
+    *("scans.scan", "scans.servo", "scans.plots"),
 )
 SUBJECTS = {  # as `catseye --help` groups the commands
     "Begin here": ("demo", "examples", "help"),
     "A night of ranges": ("reduce", "explain", "budget", "night"),
-    "Networks": ("adjust", "plan", "design", "baseline"),
-    "The telescope": ("pose", "surface", "pointing", "structure", "panels"),
-    "Laboratory": ("calibrate", "certificate", "triplet"),
-    "Air": ("air", "sound", "refractometer", "acoustic"),
-    "Light": ("point", "link", "beam", "glass", "safety"),
+    "Networks": ("adjust", "locate", "movements", "plan", "design", "baseline"),
+    "The telescope": (
+        "convert",
+        "pose",
+        "subreflector",
+        "surface",
+        "pointing",
+        "structure",
+        "model",
+        "follow",
+        "panels",
+    ),
+    "Laboratory": ("calibrate", "certificate", "triplet", "triplets"),
+    "Air": ("air", "sound", "weather", "path", "refractometer", "acoustic", "acoustic-field"),
+    "Light": ("point", "track", "link", "beam", "stray", "glass", "safety", "scan", "servo"),
+    "The signal": ("phase", "frequencies", "cycles"),
     "A living site": ("simulate", "serve", "view", "zy", "ziy", "replay", "export", "journal"),
     "Years of nights": ("archive", "restore", "query", "trends"),
     "Figures": ("plot",),
@@ -146,10 +163,11 @@ def catseye(
 
 @app.command(
     epilog="\b\nExample: catseye reduce examples/night-01 --out night-01-report\n"
+    "By a structural model: catseye reduce bent --structure structural-model/telescope.toml --out bent-report\n"
     "Several nights go into a folder each, and --resume continues: catseye reduce night-* --out nights --resume"
 )
 @grouped
-def reduce(
+def reduce(  # noqa: PLR0913 - its options are its command line
     campaign: Annotated[
         list[Path],
         typer.Argument(metavar="NIGHT ...", help="Directories of campaigns, laid out as examples/night-01."),
@@ -164,6 +182,15 @@ def reduce(
         ),
     ] = None,
     air_model: AirModel = AIR_MODEL,
+    structure: Annotated[
+        Path | None,
+        typer.Option(
+            "--structure",
+            metavar="MODEL.toml",
+            help="Structural model of the telescope: places by it, and what was measured beyond it. Without: the "
+            "night's own structural-model.toml, if any.",
+        ),
+    ] = None,
     threads: Threads = None,
     several: Several = NOTHING_SAID,
     json: Json = False,
@@ -181,6 +208,9 @@ def reduce(
     if out is not None and len(campaign) > 1:
         if threads is not None:
             raise typer.BadParameter("is for one night; several have one thread each.", param_hint="'--threads'")
+        if structure is not None:
+            text = "is for one night; each of several has its own structural-model.toml."
+            raise typer.BadParameter(text, param_hint="'--structure'")
         from catseye.api.scale.many import reduce_nights
 
         with progress_of_many("night", quiet=quiet, resumable=True) as progress:
@@ -188,9 +218,10 @@ def reduce(
         tell_many(nights, f"{out}/NAME/ for each night", json=json, quiet=quiet, strict=strict)
         return
     refuse_several(several, "nights")
-    night = _reduced(campaign[0], out, air_model, quiet)
+    night = _reduced(campaign[0], out, air_model, quiet, structure)
     tables = "ranges.csv, coordinates.csv, coordinates.json, surface.csv, pose.json, results.fits"
-    files = f"report.html, {tables}, provenance.json"
+    bent = "" if night.reduction.third_order is None else "structure.csv, structure.json, "
+    files = f"report.html, {tables}, {bent}provenance.json"
     _tell(night, f"{out}/: {files}", json=json, quiet=quiet, strict=strict)
 
 
@@ -237,7 +268,9 @@ def examples(
         say(f"Next:    catseye reduce {directory / 'night-01'} --out night")
 
 
-def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "NightResult":
+def _reduced(
+    campaign: Path, out: Path | None, air_model: str, quiet: bool, structure: Path | None = None
+) -> "NightResult":
     """Read, reduce and, when there is an `out`, write it whole or not at all."""
     from catseye.api.result import require_writable, save
 
@@ -246,7 +279,7 @@ def _reduced(campaign: Path, out: Path | None, air_model: str, quiet: bool) -> "
     try:
         from catseye.api.night import reduce as reduced
 
-        night = reduced(campaign, air_model=air_model, progress=progress)
+        night = reduced(campaign, air_model=air_model, structure=structure, progress=progress)
         if out is not None:
             night = night.held()  # all else of the adjustment may go
             save(night, out, progress=progress)

@@ -14,7 +14,19 @@ from catseye.cli.terminal import by_options, for_programs
 from catseye.errors import ArgumentError
 
 WRITTEN = frozenset(  # options and arguments whose path is made, not read
-    {"actuators", "blank", "certificate", "copy", "directory", "out", "page", "template", "write", "write_stars"}
+    {
+        "actuators",
+        "archive_samplers",
+        "blank",
+        "certificate",
+        "copy",
+        "directory",
+        "out",
+        "page",
+        "template",
+        "write",
+        "write_stars",
+    }
 )
 
 OUTPUTS = frozenset({"earlier", "epoch", "inputs", "sources"})  # read, and written by a command before

@@ -12,7 +12,11 @@ from catseye.cli.terminal import say
 @app.command(
     epilog="\b\nExample: catseye night whole-dish\n"
     "Then: catseye reduce whole-dish --out whole-dish-report\n"
-    "A small one: catseye night small --dish-prisms 60 --interval-s 14 --again 0"
+    "A small one: catseye night small --dish-prisms 60 --interval-s 14 --again 0\n"
+    "At three modulation frequencies: catseye night three --dish-prisms 60 --again 0 --frequency-hz 1500.5e6 "
+    "--frequency-hz 1510e6\n"
+    'With a wrong record: catseye night wrong --dish-prisms 60 --lie "monument ZY103 1"'
+    "\nWith a telescope that bends: catseye night bent --structure structural-model/telescope.toml"
 )
 def night(  # noqa: PLR0913 - its options are its command line
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Directory of the campaign: new or empty.")],
@@ -32,6 +36,28 @@ def night(  # noqa: PLR0913 - its options are its command line
             "0 a steady drift and a rigid telescope."
         ),
     ] = 1.0,
+    frequencies_hz: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--frequency-hz",
+            metavar="HZ",
+            help="Further modulation frequency, 1e9 to 2e9, that every line is also measured at; may repeat. "
+            "They resolve whole cycles.",
+        ),
+    ] = None,
+    lies: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--lie",
+            metavar='"KIND [NAME] [SIZE]"',
+            help="Wrong record or unexpected nature, the truth unchanged; may repeat. "
+            "catseye help lying-nights has the kinds.",
+        ),
+    ] = None,
+    structure: Annotated[
+        Path | None,
+        typer.Option("--structure", metavar="MODEL.toml", help="Structural model that bends the telescope."),
+    ] = None,
     json: Json = False,
 ) -> None:
     """A simulated night of the whole telescope as a campaign: 18 rangers, 2209 prisms, 20 000 shots."""
@@ -47,6 +73,9 @@ def night(  # noqa: PLR0913 - its options are its command line
         interval_s=interval_s,
         again=again,
         nature=nature,
+        frequencies_hz=frequencies_hz or (),
+        lies=lies or (),
+        structure=structure,
     )
     if json:
         say(json_text({"written": str(where), "seed": seed, "nature": nature, "truth": str(where / "truth.json")}))

@@ -96,7 +96,7 @@ def sky(  # noqa: PLR0913 - its options are its command line
         start=None if start is None else _counts(start),
         end=None if end is None else _counts(end),
     )
-    _finish(result, out, json, quiet)
+    finish(result, out, json, quiet)
 
 
 @plots.command(epilog="\b\nExample: catseye plot servo --counts 10000 --out servo.svg")
@@ -111,7 +111,7 @@ def servo(
     """A move of a mirror's servo."""
     from catseye.api.figures import plot_servo
 
-    _finish(plot_servo(mirror=mirror, counts=counts, axis=axis), out, json, quiet)
+    finish(plot_servo(mirror=mirror, counts=counts, axis=axis), out, json, quiet)
 
 
 @plots.command(
@@ -147,7 +147,7 @@ def air(  # noqa: PLR0913 - its options are its command line
         u_pressure_hpa=u_pressure_hpa,
         u_humidity_percent=u_humidity_percent,
     )
-    _finish(result, out, json, quiet)
+    finish(result, out, json, quiet)
 
 
 @plots.command("return", epilog="\b\nExample: catseye plot return --out return.svg")
@@ -155,7 +155,7 @@ def return_(out: Out, json: Json = False, quiet: Quiet = False) -> None:
     """Return and range change of each kind of retroreflector against the incidence."""
     from catseye.api.figures import plot_return
 
-    _finish(plot_return(), out, json, quiet)
+    finish(plot_return(), out, json, quiet)
 
 
 @plots.command(epilog="\b\nExample: catseye plot aberration --beam-radius-mm 10 --out aberration.svg")
@@ -170,7 +170,7 @@ def aberration(
     """The ball's spherical aberration: range, deviation and light against the ray's height."""
     from catseye.api.figures import plot_aberration
 
-    _finish(plot_aberration(beam_radius_mm=beam_radius_mm), out, json, quiet)
+    finish(plot_aberration(beam_radius_mm=beam_radius_mm), out, json, quiet)
 
 
 @plots.command(
@@ -190,7 +190,7 @@ def coating(
     from catseye.api.figures import plot_coating
 
     result = plot_coating(names or (), wavelength_um=wavelength_um, incidence_deg=incidence_deg)
-    _finish(result, out, json, quiet)
+    finish(result, out, json, quiet)
 
 
 @plots.command(epilog="\b\nExample: catseye plot polarization --glass BK7-old --out polarization.svg")
@@ -204,7 +204,7 @@ def polarization(
     """Polarization of cube corners: six sectors, and the return through an analyser."""
     from catseye.api.figures import plot_polarization
 
-    _finish(plot_polarization(glass=glass, wavelength_um=wavelength_um), out, json, quiet)
+    finish(plot_polarization(glass=glass, wavelength_um=wavelength_um), out, json, quiet)
 
 
 @plots.command(epilog="\b\nExample: catseye plot beam examples/beams/head.toml --out beam.svg")
@@ -219,10 +219,10 @@ def beam(
     """A beam along its path from the diode to the detector."""
     from catseye.api.figures import plot_beam
 
-    _finish(plot_beam(train), out, json, quiet)
+    finish(plot_beam(train), out, json, quiet)
 
 
-def _finish(result: "FigureResult", out: Path, json: bool, quiet: bool) -> None:
+def finish(result: "FigureResult", out: Path, json: bool, quiet: bool) -> None:
     """Write the figure whole or not at all, and say its numbers."""
     written = result.save_figure(out)
     tell(replace(result, written=written), json=json, quiet=quiet, written=[("Written to", out)])

@@ -6,16 +6,11 @@ from typing import Annotated, NamedTuple
 import typer
 
 from catseye.cli.commands import Json, app
-from catseye.cli.numbers import numbers_of, row_of
+from catseye.cli.numbers import row_of
 from catseye.cli.option_groups import grouped
 from catseye.cli.results import Strict, tell
-from catseye.cli.vocabularies import REFLECTORS, one_of
-
-PLACE = "x,y,z in metres"
-
-
-def _points(texts: list[str] | None) -> list[list[float]]:
-    return [numbers_of(text, 3, PLACE) for text in texts or []]
+from catseye.cli.telescope.ranger import PLACE, RangerOptions, points_of
+from catseye.cli.vocabularies import REFLECTORS, TELESCOPE_FRAMES, one_of
 
 
 class _Forbidden(NamedTuple):
@@ -68,7 +63,8 @@ class _View(NamedTuple):
             "--posture",
             metavar="AZ,EL",
             callback=row_of(2, "AZ,EL in degrees"),
-            help="Posture of the telescope, deg, for its solids.",
+            help="Posture of the telescope, deg, for points, rangers and solids that it carries; the site's if not "
+            "given.",
         ),
     ] = None
 
@@ -76,16 +72,22 @@ class _View(NamedTuple):
 @app.command(
     epilog="\b\nExample: catseye point --monument examples/night-01/monuments/ZY103.toml "
     "--mirror examples/night-01/mirrors/ZP103.toml --to=0,0,50\n"
+    "         catseye point --site gbt --ranger ZY115 --frame reflector --posture 145.3,30 --to=0,54,12.2\n"
     "With the Sun: add --at 2003-09-10T14:00:00Z --longitude-deg=-79.84"
 )
 @grouped
 def point(  # noqa: PLR0913 - its options are its command line
     *,
-    monument: Annotated[Path, typer.Option("--monument", metavar="M.toml", help="Record of the monument.")],
-    mirror: Annotated[Path, typer.Option("--mirror", metavar="Z.toml", help="Record of the mirror on it.")],
+    mounted: RangerOptions,
+    frame: Annotated[
+        str,
+        typer.Option(
+            "--frame", metavar=TELESCOPE_FRAMES, callback=one_of(TELESCOPE_FRAMES), help="Frame of the points."
+        ),
+    ] = "ground",
     to: Annotated[
         list[str] | None,
-        typer.Option("--to", metavar="X,Y,Z", callback=_points, help="Point, ground, m; may repeat."),
+        typer.Option("--to", metavar="X,Y,Z", callback=points_of, help="Point, m, in --frame; may repeat."),
     ] = None,
     file: Annotated[
         Path | None, typer.Option("--file", metavar="coord.dat", help="Points, a line each: x y z in mm, # comments.")
@@ -103,7 +105,8 @@ def point(  # noqa: PLR0913 - its options are its command line
 
     if bool(to) == (file is not None):
         raise typer.BadParameter("give points by --to or by --file, one of the two.", param_hint="'--to'")
-    result = pointed(monument, mirror, to if file is None else file, **forbidden._asdict(), **view._asdict())
+    points = to if file is None else file
+    result = pointed(to=points, frame=frame, **mounted._asdict(), **forbidden._asdict(), **view._asdict())
     if write is not None:
         result.save_counts(write)
     tell(result, json=json, strict=strict, rows=result.lines())

@@ -14,18 +14,20 @@ from catseye import names
 AIR_MODELS = "|".join(names.AIR_MODELS)
 AIR_MODEL = names.NOTES_AIR_MODEL  # of a reduction
 SOUND_MODELS = "parker2004|cramer1993|real_gas"
+PRESSURES_AT = "station|sea-level|altimeter"
 THERMOMETRY_MODELS = "real_gas|cramer1993|parker2004"  # the one of choice first
 
 # optics and mirrors
 EDITIONS = "iec2014|ansi2014"
 REFLECTORS = "|".join(names.RETROREFLECTORS)
+OSCILLATORS = "above|below"
 
 # calibrations and their reports
 CALIBRATION_KINDS = (
-    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|oscillator|repeatability|"
-    "prism-constant|ball-constant|gauge-blocks|spacers|invar-wire|autocollimation|height-gauge|both-faces|"
+    "reference-distance|leakage|leakage-lit|linearity|retroreflector|amplitude-to-phase|second-pass|"
+    "feedback|oscillator|repeatability|prism-constant|ball-constant|gauge-blocks|spacers|invar-wire|autocollimation|height-gauge|both-faces|"
     "both-faces-pointing|encoder|limits|alignment|detector-focus|search-results|monument-azimuth|plate-levels|"
-    "monument-place|inclinometer|hydrostatic-level"
+    "monument-place|inclinometer|hydrostatic-level|reference-cube|mounting-plate"
 )
 REPORT_KINDS = "monument|mirror"
 
@@ -33,6 +35,7 @@ REPORT_KINDS = "monument|mirror"
 DATUMS = "free|fixed"
 NETWORK_WEIGHTS = "huber|l1|biweight|igg3"
 COMPONENTS = "rangers|groups"
+LOCATE_METHODS = "least_squares|averaging"
 DESIGN_CRITERIA = "trace|worst|pose|gain"
 
 # the telescope
@@ -45,8 +48,10 @@ PARABOLOID_PARTS = "vertex|axis|focal-length"
 NUMBERINGS = "noll|ansi"
 PRISM_FRAMES = "reflector|ground"
 TRAVELS = "normal|axis"
+TELESCOPE_FRAMES = "ground|alidade|elevation|reflector|feed_arm|prime_focus|subreflector"
 SERIES_FRAMES = "reflector|alidade|ground"
 OWN_FUNCTIONS = "place|each"
+NODE_UNITS = "m|mm|in"
 
 # a living site
 CONDITIONS = "night|windy-day|dewy-night"

@@ -61,6 +61,19 @@ def _polarization(s: Summary) -> list[Passage]:
     return [Passage("The light", f"{s['wavelength_um']:g} µm; {s['glass']} has the index {s['index']:.6f}."), *corners]
 
 
+def _quadrant(s: Summary) -> list[Passage]:
+    steps = s["settled_after_steps"]
+    settled = "it does not settle within these steps" if steps is None else f"it settles after {steps} steps"
+    um = {key: value * 1e6 for key, value in s.items() if key != "settled_after_steps"}
+    return [
+        Passage("The spot", f"{um['spot']:.4g} µm radius at 1/e²; near the centre the place is "
+                f"{um['centre_slope']:.4g} µm times the difference of the halves over their sum."),
+        Passage("Saturation", f"to first order a place reads 90 % or more out to {um['reads_90_percent_to']:.3g} µm."),
+        Passage("The noise", f"u {um['u_place_centre']:.3g} µm of one reading at the centre."),
+        Passage("The servo", f"{settled}; there u {um['u_settled']:.3g} µm remains."),
+    ]  # fmt: skip
+
+
 def _span(low: float, high: float) -> str:
     first, last = (f"{100 * v:.2g}" for v in (low, high))
     return f"{first} %" if first == last else f"{first} to {last} %"
@@ -85,4 +98,9 @@ def _text(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-PASSAGES: dict[str, Callable[[Summary], list[Passage]]] = {"servo": _servo, "air": _air, "polarization": _polarization}
+PASSAGES: dict[str, Callable[[Summary], list[Passage]]] = {
+    "servo": _servo,
+    "air": _air,
+    "polarization": _polarization,
+    "quadrant": _quadrant,
+}

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from catseye.optics.zernike import Term
-from catseye.records.panels.actuators import read_corrections
+from catseye.records.files.reading import Folder
+from catseye.records.panels.actuators import ActuatorCorrection
 from kept_scene import reduction_directory
 from surface_scene import NAMES, half_path_of, prisms
 
@@ -53,7 +54,7 @@ def test_one_epoch_with_everything(catseye, tmp_path):
     files = "actuators.csv prisms.csv provenance.json report.html samplers.fits surface.json zernike.csv"
     assert sorted(p.name for p in out.iterdir()) == files.split()
     assert json.loads((out / "surface.json").read_text()) == found
-    rows = read_corrections(out / "actuators.csv")
+    rows = Folder(out).table("actuators.csv", ActuatorCorrection)
     assert len(rows) == 2209
     from astropy.io import fits as pyfits
 

@@ -99,15 +99,27 @@ def test_one_thing_has_one_verdict_and_some_weather_must_be_left(folder):
         judged(folder, lines)
 
 
-@pytest.mark.parametrize(("column", "value"), [(2, "59.0"), (2, "-59.5"), (3, "505.0")])
-def test_impossible_air_is_refused_with_station_file_and_time(folder, column, value):
-    """Each reading could be; what the paths make of both stations could not."""
+def with_wx2(folder, column, value):
+    """The campaign with one value in all readings of WX2."""
     head, rows = weather_rows(folder)
     for row in rows:
         if row[1] == "WX2":
             row[column] = value
     (folder / "weather.csv").write_text("\n".join([head, *map(",".join, rows)]) + "\n")
+    return read_campaign(folder)
+
+
+def test_impossible_air_is_refused_with_station_file_and_time(folder):
+    """Each reading could be; what the paths make of both stations could not."""
     with pytest.raises(InputError, match=r"^weather\.csv: at 52889\.1\d{4} the stations read WX1 1") as caught:
-        reduce_epoch(read_campaign(folder))
-    assert f"; WX2 {float(value):.1f}" in str(caught.value) or value == "505.0"
+        reduce_epoch(with_wx2(folder, 2, "-59.5"))
+    assert "; WX2 -59.5" in str(caught.value)
     assert "element" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("column", "value"), [(2, "59.0"), (3, "505.0")])
+def test_air_that_one_station_alone_makes_impossible_is_left_out(folder, column, value):
+    reduction = reduce_epoch(with_wx2(folder, column, value))
+    (record,) = reduction.implausible
+    assert record.owners == ("WX2",)
+    assert "left out" in reduction.verdict.why

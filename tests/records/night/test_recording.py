@@ -157,10 +157,3 @@ def test_channels_and_sampling_must_be_the_sheets(tmp_path, sheet):
         read_recording(tmp_path / "x.wav", sheet)
     with pytest.raises(InputError, match="missing"):
         read_recording(tmp_path / "none.wav", sheet)
-
-
-def test_weather_is_linear_in_time_and_held_beyond_its_ends(sheet):
-    t, p, h = sheet.weather_at(np.array([61365.0, 61365.12, 61366.0]))
-    assert t == pytest.approx([16.2, 15.05, 13.9])
-    assert (p == 930.4).all()
-    assert (h == 71.0).all()

@@ -16,7 +16,7 @@ from catseye.gateways.epoch.tables import kinds_of
 from catseye.records.archive.reading import open_archive
 from catseye.records.night.campaign import read_campaign
 from catseye.records.site.folder import site_files
-from catseye.reduction.epoch.unknowns import BENCHMARKS, MONUMENTS, OFFSETS, ZEROS
+from catseye.reduction.epoch.prior_names import BENCHMARKS, MONUMENTS, OFFSETS, ZEROS
 from catseye.reduction.query.again import archived_points, reduced_again
 from catseye.reduction.query.renewed import calibrated_anew, changed_records, with_records
 from repository import ROOT

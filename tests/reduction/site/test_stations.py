@@ -8,7 +8,8 @@ from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
 from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
-from catseye.reduction.site.stations import AXES, TILTS, imperfections_of, point, station_of
+from catseye.reduction.site.stations import AXES, TILTS, imperfections_of, pointings_of, station_of
+from catseye.reduction.steering.mounted import ranger_of_records
 from draws import draws
 
 MONUMENT = MonumentGeometry(
@@ -34,6 +35,13 @@ REAL = MIRROR.model_copy(
     }
 )
 TO = np.array([[5.0, 10.0, 20.0], [-8.0, 12.0, -3.0], [6.0, 19.0, -9.0]])  # the last two to either side of Theta's cut
+
+
+def point(monument, mirror, to):
+    """Counts of a ranger of two records, with their u."""
+    ranger = ranger_of_records(monument, mirror)
+    station = ranger.station(None)
+    return pointings_of(station, mirror, to, name=ranger.name, spread=lambda at: ranger.counts_covariance(station, at))
 
 
 @draws(2000, name="n")

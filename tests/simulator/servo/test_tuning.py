@@ -1,5 +1,6 @@
 """Tuning: against scipy's sampling, the roots of the loop, the chip itself and planted axes."""
 
+from dataclasses import replace
 from math import exp, pi, sqrt
 
 import numpy as np
@@ -7,18 +8,17 @@ import pytest
 from scipy.signal import cont2discrete, freqz
 
 from catseye.constants import DEGREE
-from catseye.errors import EstimationError, ValidityError
-from catseye.ranger.motion_units import SAMPLE_TIME, acceleration_integer, velocity_integer
-from catseye.simulator.servo.axis import AxisTrace, ServoAxis
+from catseye.errors import ValidityError
+from catseye.ranger.motion_units import SAMPLE_TIME
 from catseye.simulator.servo.motion_chip import MotionChip
-from catseye.simulator.servo.motor import AxisDesign, Motor
+from catseye.simulator.servo.motor import AxisDesign
 from catseye.simulator.servo.tuning import (
     Filter,
     Plant,
+    bandwidth,
     closed_loop,
     design_filter,
     filter_response,
-    identify,
     margins,
     plant_of,
     plant_response,
@@ -26,22 +26,6 @@ from catseye.simulator.servo.tuning import (
 )
 
 PLANT = plant_of(AxisDesign())
-
-
-def moves(design: AxisDesign, *targets: int, bits: int = 8) -> list[AxisTrace]:
-    plant = plant_of(design)
-    made = ServoAxis(MotionChip(output_bits=bits), Motor(design))
-    made.axis(True)
-    made.flt(*design_filter(plant, crossover_hz=20.0, interval=3).values)
-    made.erl(25_000)
-    made.abv(velocity_integer(12_000))
-    made.aba(acceleration_integer(40_000))
-    traces = []
-    for target in targets:
-        made.abp(target)
-        made.stt()
-        traces.append(made.run(4000))
-    return traces
 
 
 @pytest.mark.parametrize("plant", [PLANT, Plant(7e3, 0.0), Plant(2e4, 40.0), Plant(7e3, 0.2)])
@@ -114,30 +98,21 @@ def test_without_an_integral_the_gain_may_fall_to_nothing():
     assert margins(PLANT, Filter(356, 0, 17_000, 0)).gain_below == 0.0
 
 
-@pytest.mark.parametrize("bits", [8, 12])
-def test_a_planted_axis_is_identified_from_its_moves(bits):
-    design = AxisDesign(inertia=4e-3, viscous=12e-3, coulomb=10e-3, static=11e-3)
-    truth = plant_of(design)
-    found = identify(*moves(design, 10_000, 0, bits=bits), output_bits=bits)
-    assert found.gain == pytest.approx(truth.gain, rel=0.02)  # the following error's own part of the acceleration
-    assert found.decay == pytest.approx(truth.decay, rel=0.1)
-    assert found.friction == pytest.approx(truth.friction, abs=0.3)  # steps
+def test_the_bandwidth_is_where_the_closed_loop_halves_the_power():
+    chosen = design_filter(PLANT, crossover_hz=20.0)
+    above, below = closed_loop(PLANT, chosen)
+    frequency = bandwidth(PLANT, chosen) * SAMPLE_TIME * np.array([1.0, 1.01])
+    at, past = np.abs(freqz(above, below, worN=frequency)[1])
+    assert at == pytest.approx(sqrt(0.5), rel=1e-3)
+    assert past < at
 
 
-def test_an_identified_axis_is_tuned_as_the_true_one():
-    found = identify(*moves(AxisDesign(), 10_000, 0))
-    chosen, ideal = (design_filter(plant, crossover_hz=30.0, interval=3) for plant in (found, PLANT))
-    assert np.allclose(chosen.values[:3], ideal.values[:3], rtol=0.03)
-
-
-def test_uninformative_moves_are_refused():
-    still = AxisTrace(np.arange(9) * SAMPLE_TIME, *(np.zeros((5, 9))))
-    with pytest.raises(EstimationError, match="do not separate"):
-        identify(still)
-    real = moves(AxisDesign(), 5000)[0]
-    swapped = AxisTrace(real.time, real.desired, real.velocity, real.actual, real.angle, -real.output)
-    with pytest.raises(EstimationError, match="against the acceleration"):
-        identify(swapped)
+def test_a_late_drive_costs_phase_by_its_delay():
+    chosen, late = design_filter(PLANT, crossover_hz=20.0), 1e-3
+    prompt, delayed = (margins(plant, chosen) for plant in (PLANT, replace(PLANT, late=late)))
+    assert prompt.phase - delayed.phase == pytest.approx(prompt.crossover * late, rel=1e-9)
+    with pytest.raises(ValidityError, match=r"drive late by 0\.001 s"):
+        closed_loop(replace(PLANT, late=late), chosen)
 
 
 @pytest.mark.parametrize(
@@ -172,10 +147,6 @@ def test_other_refusals():
     for time, position in (([0.0, 1.0], [0.0, np.nan]), ([], []), ([0.0, 1.0], [0.0])):
         with pytest.raises(ValidityError, match="finite numbers"):
             step_metrics(time, position, target=5.0)
-    one = AxisTrace(np.zeros(1), *np.zeros((5, 1)))
-    for traces in ((), (one,)):
-        with pytest.raises(EstimationError, match="no moves"):
-            identify(*traces)
 
 
 def test_the_limit_of_the_integral_holds_the_friction():

@@ -15,6 +15,7 @@ from catseye.geometry.mirror.mirror_path import beam_angles, path_change
 from catseye.optics.retroreflector.kinds.registry import BALL
 from catseye.records.night.live import LivePosture
 from catseye.records.site.folder import read_site
+from catseye.signal.systematics.multipath import second_pass_turn
 from catseye.simulator.night.air import group_refractivity_ppm
 from catseye.simulator.twin.conditions import DEWY_NIGHT, STILL, LivingPlanted
 from catseye.simulator.twin.faults import Fault, FaultBoard
@@ -289,15 +290,44 @@ def test_heads_with_amplitude_and_cyclic_terms_show_them():
             "cyclic_cosine_mm": (0.0, 0.01),
             "cyclic_sine_mm": (0.02, 0.0),
             "u_cyclic_mm": 0.001,
+            "second_pass_cosine_per_volt": 3e-4,
+            "second_pass_sine_per_volt": -2e-4,
+            "u_second_pass_per_volt": 1e-5,
         }
     )
     changed = replace(site(), mirrors=site().mirrors | {sheet.zp: odd})
     plain, made = twin(planted=STILL), twin(planted=STILL, at=changed)
     z, y = aimed(plain, "ZY105", "ZEG41040L", 0.0)[0], aimed(made, "ZY105", "ZEG41040L", 0.0)[0]
-    x = np.angle(z) - plain.returns.electronics["ZY105"](np.zeros(1))[0]
+    x = np.angle(z / aimed(plain, "ZY105", "ZRG", 0.0)[0])
     long = (0.02 * np.sin(x) + 0.01 * np.cos(2 * x)) * MILLIMETRE
-    expected = 2e-3 * np.log(abs(z) / 6.5) - K * long
+    again, _ = second_pass_turn(x, abs(z), 3e-4, -2e-4)
+    expected = 2e-3 * np.log(abs(z) / 6.5) - K * long - again
     assert np.angle(y / z) == pytest.approx(expected, abs=1e-9)
+    assert aimed(made, "ZY105", "ZRG", 0.0)[0] == aimed(plain, "ZY105", "ZRG", 0.0)[0]
+
+
+def test_light_back_into_the_laser_turns_each_shot_by_another_fringe():
+    """Standard deviation that the sheet states, each way as often; one turn within a shot."""
+    sheet = site().mirror_of("ZY105").model_copy(update={"u_feedback_rad": 2e-3})
+    changed = replace(site(), mirrors=site().mirrors | {sheet.zp: sheet})
+    plain, made = twin(planted=STILL), twin(planted=STILL, at=changed)
+    where = "ZY105", "ZEG41040L"
+    turns = [np.angle(aimed(made, *where, t)[0] / aimed(plain, *where, t)[0]) for t in np.arange(400.0)]
+    assert np.std(turns) == pytest.approx(2e-3, rel=0.08)  # 3 of its own, arcsine of 400
+    assert abs(np.mean(turns)) < 3e-4
+    assert np.max(np.abs(turns)) <= 2e-3 * np.sqrt(2.0) * (1 + 1e-9)
+
+
+def test_images_wander_over_a_detector_whose_centre_is_late():
+    """Mean and scatter of a shot's lead by hand: 20 mrad, 0.2 and 0.1 of the radius; 2 u^2 and 2 u root(d^2 + u^2)."""
+    detector = {"detector_radius_mm": 0.1, "detector_lag_rad": 0.02, "image_offset_um": 20.0, "u_image_um": 10.0}
+    sheet = site().mirror_of("ZY105").model_copy(update=detector)
+    changed = replace(site(), mirrors=site().mirrors | {sheet.zp: sheet})
+    plain, made = twin(planted=STILL), twin(planted=STILL, at=changed)
+    where = "ZY105", "ZEG41040L"
+    turns = np.array([np.angle(aimed(made, *where, t)[0] / aimed(plain, *where, t)[0]) for t in np.arange(600.0)])
+    assert np.mean(turns) == pytest.approx(0.02 * 2 * 0.1**2, abs=3 * 9e-4 / np.sqrt(600))
+    assert np.std(turns) == pytest.approx(0.02 * 2 * 0.1 * np.hypot(0.2, 0.1), rel=0.1)
     assert aimed(made, "ZY105", "ZRG", 0.0)[0] == aimed(plain, "ZY105", "ZRG", 0.0)[0]
 
 

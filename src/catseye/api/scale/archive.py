@@ -4,10 +4,11 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from catseye.aliases import Progress
 from catseye.api.result import Result, quantities
+from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -56,14 +57,15 @@ class ArchiveResult(Result):
         """False if a source failed or the verification named a damaged file."""
         return self.verdict.word != "failed"
 
+    @with_units
     def table(
         self,
         kind: str,
         columns: Sequence[str] | None = None,
         *,
-        where: dict[str, Any] | None = None,
-        since: float | None = None,
-        until: float | None = None,
+        where: Annotated[Any, In("name")] = None,
+        since: Annotated[Any, In("mjd", one=True)] = None,
+        until: Annotated[Any, In("mjd", one=True)] = None,
     ) -> "QTable":
         """Columns of a table over all nights, sorted by its first column and `mjd`.
 
@@ -81,7 +83,8 @@ class ArchiveResult(Result):
         rows = read_table(self.archive, kind, columns, where=where, since=since, until=until)
         return quantities({name: (values, layout.field(name).unit) for name, values in rows.items()})
 
-    def samples(self, night: str, rows: Sequence[int] | None = None) -> "np.ndarray":
+    @with_units
+    def samples(self, night: str, rows: Annotated[Any, In("", many=True)] = None) -> "np.ndarray":
         """Samples of a night, (shots, samples) int16, bit for bit.
 
         night   identifier, or a beginning that only one has
@@ -143,6 +146,7 @@ class ArchiveResult(Result):
         return (self.directory,)
 
 
+@with_units
 def archive(
     directory: "str | os.PathLike[str]",
     sources: "Sequence[str | os.PathLike[str]] | str | os.PathLike[str]" = (),
@@ -150,7 +154,7 @@ def archive(
     check: bool = False,
     compact: bool = False,
     remove: Sequence[str] = (),
-    processes: int | None = None,
+    processes: Annotated[Any, In("", whole=True)] = None,
     cluster: str | None = None,
     progress: Progress | None = None,
 ) -> ArchiveResult:

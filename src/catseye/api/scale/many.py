@@ -4,11 +4,12 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from catseye.aliases import Progress
 from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
+from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError
 from catseye.names import NOTES_AIR_MODEL
 
@@ -72,12 +73,13 @@ class ManyResult(Result):
         return {f"{self.noun}s": quantities(columns)}
 
 
+@with_units
 def reduce_nights(
     nights: "Sequence[str | os.PathLike[str]]",
     directory: "str | os.PathLike[str]",
     *,
     air_model: str = NOTES_AIR_MODEL,
-    processes: int | None = None,
+    processes: Annotated[Any, In("", whole=True)] = None,
     cluster: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,

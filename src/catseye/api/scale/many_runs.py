@@ -90,7 +90,7 @@ def simulate_runs(
     round_s: Annotated[Any, In("s", one=True)] = 10.0,
     filter_: str = "random_walk",
     drop: Sequence[str] = (),
-    processes: int | None = None,
+    processes: Annotated[Any, In("", whole=True)] = None,
     cluster: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
@@ -166,13 +166,14 @@ def simulate_runs(
     return SimulatedRuns(verdict=verdict, outcomes=tuple(outcomes), noun="run", scatter=rows)
 
 
+@with_units
 def replay_journals(
     journals: "Sequence[str | os.PathLike[str]]",
     directory: "str | os.PathLike[str] | None" = None,
     *,
-    run: int | str | None = None,
+    run: Annotated[Any, In("", whole=True, text=True)] = None,
     calibrations: "str | os.PathLike[str] | None" = None,
-    processes: int | None = None,
+    processes: Annotated[Any, In("", whole=True)] = None,
     cluster: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,

@@ -24,6 +24,18 @@ Out = Annotated[
     typer.Option("--out", metavar="DIR", help="Directory to write: new, empty, or an earlier output of catseye."),
 ]
 
+Structure = Annotated[
+    Path | None,
+    typer.Option("--structure", metavar="MODEL.toml", help="Structural model, whose offset of the beam is taken out."),
+]
+SiteOfStructure = Annotated[
+    Path | None, typer.Option("--site", metavar="SITE", help="Site with the paraboloid, for --structure.")
+]
+StructureTemperature = Annotated[
+    float | None,
+    typer.Option("--temperature-c", help="Temperature of the structure; the model's reference if not given."),
+]
+
 
 @pointing.command(
     epilog="\b\nExample: catseye pointing fit examples/pointing/stars.dat --against published --out pointing-report\n"
@@ -49,6 +61,9 @@ def fit(  # noqa: PLR0913 - its options are its command line
     reject: Annotated[
         bool, typer.Option("--reject", help="Reject observations with |w| above 4, one at a time.")
     ] = False,
+    structure: Structure = None,
+    site: SiteOfStructure = None,
+    temperature_c: StructureTemperature = None,
     write: Annotated[
         Path | None, typer.Option("--write", metavar="MODEL.toml", help="File of the series with its covariance.")
     ] = None,
@@ -65,9 +80,18 @@ def fit(  # noqa: PLR0913 - its options are its command line
     from catseye.api.pointing import fit_pointing
     from catseye.api.result import require_writable, save
 
-    require_writable(out, *files)
+    require_writable(out, *files, structure, site)
     chosen = [term.strip().upper() for term in terms.split(",")]
-    result = fit_pointing(files, against=against, terms=chosen, u_arcsec=u_arcsec, reject=reject)
+    result = fit_pointing(
+        files,
+        against=against,
+        terms=chosen,
+        u_arcsec=u_arcsec,
+        reject=reject,
+        structure=structure,
+        site=site,
+        temperature_c=temperature_c,
+    )
     if write_stars is not None:
         result.save_stars(write_stars)
     if write is not None:
@@ -81,18 +105,25 @@ def fit(  # noqa: PLR0913 - its options are its command line
 
 
 @pointing.command(
-    epilog="\b\nExample: catseye pointing predict --azimuth-deg 145.3 --elevation-deg 30 --model published"
+    epilog="\b\nExample: catseye pointing predict --azimuth-deg 145.3 --elevation-deg 30 --model published\n"
+    "         catseye pointing predict --azimuth-deg 145.3 --elevation-deg 30 --model residual.toml "
+    "--structure examples/structural-model/telescope.toml --site gbt --temperature-c 5"
 )
 def predict(
     azimuth_deg: Annotated[float, typer.Option("--azimuth-deg", help="Azimuth on the sky, clockwise from north.")],
     elevation_deg: Annotated[float, typer.Option("--elevation-deg", help="Elevation on the sky.")],
     model: Annotated[str, typer.Option("--model", metavar="published|MODEL.toml", help="The series.")] = "published",
+    structure: Structure = None,
+    site: SiteOfStructure = None,
+    temperature_c: StructureTemperature = None,
     json: Json = False,
 ) -> None:
     """Predict the encoders' corrections for a direction on the sky."""
     from catseye.api.pointing import predict_pointing
 
-    result = predict_pointing(azimuth_deg, elevation_deg, model=model)
+    result = predict_pointing(
+        azimuth_deg, elevation_deg, model=model, structure=structure, site=site, temperature_c=temperature_c
+    )
     tell(result, json=json, rows=result.lines())
 
 

@@ -159,7 +159,11 @@ class _Corrections(NamedTuple):
     ] = None
     positions: Annotated[
         Path | None,
-        typer.Option("--positions", metavar="FILE.csv", help="Positions of the actuators; mid-travel if not given."),
+        typer.Option(
+            "--positions",
+            metavar="FILE.csv",
+            help="Positions of the actuators, or actuators.csv whose steps were made; mid-travel if not given.",
+        ),
     ] = None
     travel: Annotated[
         str,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from catseye.gateways.writers.passage import Passage
+from catseye.names import counted
 from catseye.reduction.panels.crew import members, sessions, standing, zeros
 from catseye.reduction.panels.heights import surface_rms
 from catseye.reduction.panels.job import verdicts
@@ -151,13 +152,14 @@ def doubt_text(one: "Doubt") -> str:
 def passages(work: "PanelWork") -> list[Passage]:
     """Passages of the command's output."""
     heights, last = work.found, work.latest
+    serial = "" if work.sheet.serial is None else f", serial {work.sheet.serial}"
     goal = work.sheet.goal_um
     passages = [
         Passage(
             "The tool",
-            f"{work.sheet.name}, serial {work.sheet.serial}: {int(np.sum(heights.readings.corner >= 0))} placements in "
-            f"{len(heights.readings.sessions)} sessions on {len(heights.layout.panels)} panels; variance factor "
-            f"{heights.variance_factor:.3f} with {heights.degrees_of_freedom:.0f} degrees of freedom",
+            f"{work.sheet.name}{serial}: {counted(int(np.sum(heights.readings.corner >= 0)), 'placement')} in "
+            f"{counted(len(heights.readings.sessions), 'session')} on {len(heights.layout.panels)} panels; variance "
+            f"factor {heights.variance_factor:.3f} with {heights.degrees_of_freedom:.0f} degrees of freedom",
         ),
         Passage("As found", standing_text(standing(heights), goal)),
     ]

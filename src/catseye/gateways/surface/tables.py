@@ -299,7 +299,7 @@ def epochs_csv(lookup: Lookup) -> str:
 
 
 def actuators_csv(rows: Iterable[ActuatorCorrection]) -> str:
-    """One row per actuator, as read exactly by `read_corrections`."""
+    """One row per actuator, read back to the bit as `ActuatorCorrection`."""
     return ACTUATORS.csv(list(rows))
 
 

@@ -45,7 +45,7 @@ def json_page(value: dict[str, Any]) -> str:
         if isinstance(item, dict) and item:
             inner = ",\n".join(f"    {json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in item.items())
             lines.append(f"{start}{{\n{inner}\n  }}")
-        elif isinstance(item, list) and item and isinstance(item[0], list):
+        elif isinstance(item, list) and item and isinstance(item[0], list | dict):
             inner = ",\n".join(f"    {json.dumps(row, allow_nan=False)}" for row in item)
             lines.append(f"{start}[\n{inner}\n  ]")
         else:

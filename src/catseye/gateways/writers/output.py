@@ -34,6 +34,20 @@ FORMATS = (
     "catseye-structure-1",
     "catseye-panels-1",
     "catseye-result-1",
+    "catseye-acoustic-field-1",
+    "catseye-detection-1",
+    "catseye-model-1",
+    "catseye-movements-1",
+    "catseye-path-1",
+    "catseye-positions-1",
+    "catseye-weather-series-1",
+    "catseye-scan-fit-1",
+    "catseye-scan-compare-1",
+    "catseye-scan-search-1",
+    "catseye-servo-identify-1",
+    "catseye-design-study-1",
+    "catseye-query-1",
+    "catseye-trends-1",
 )
 
 

@@ -12,6 +12,8 @@ Sun itself, which does not move its middle.
 z is the normal of the ellipsoid. Where the ground frame's z is the plumb line, the whole sky is turned by the
 deflection of the vertical, some 10" and up to 60" in mountains. And the axes belong to one place: the normal turns by
 4" over 120 m, so that all rangers of a site take the direction at the origin of the frame.
+
+Source: [PARKER04] section 2.7, eq. 2.47.
 """
 
 import warnings
@@ -72,30 +74,6 @@ def sun_direction(
     apparent = _seen_from(tt, _applied(space_from_true, observer), _applied(space_from_true, velocity))
     earth_fixed = _turned(_applied(true_from_space, apparent), -sidereal)
     return _east_north_up(earth_fixed, phi, lam)
-
-
-def apparent_geocentric(tt_mjd: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Right ascension in [0, 2 pi), declination, rad, distance, m, of the Sun, (...) each.
-
-    From the Earth's centre.
-
-    tt_mjd    (...), Terrestrial Time, 15020 to 88069 (1900 to 2099)
-
-    True equator and equinox of date, with aberration: as printed in an almanac. Raises ValidityError outside the years.
-
-    Source: [SOFA23]. [MEEUS98] example 25.b is met within 0.06".
-
-    >>> right_ascension, declination, _ = apparent_geocentric(48908.0)  # Meeus: 198.378 119, -7.783 817 degrees
-    >>> [round(float(np.degrees(a)), 4) for a in (right_ascension, declination)]
-    [198.3781, -7.7838]
-    """
-    import erfa
-
-    tt = _checked(tt_mjd, 15_020.0, LATEST_MJD, "tt_mjd", "TT as Modified Julian Day")
-    still = np.zeros((*tt.shape, 3))
-    to_sun = np.linalg.norm(_sun_vector(tt, still)[0], axis=-1)
-    x, y, z = np.moveaxis(_applied(erfa.pnm06a(MJD_ZERO, tt), _seen_from(tt, still, still)), -1, 0)
-    return np.arctan2(y, x) % TWO_PI, np.arctan2(z, np.hypot(x, y)), to_sun
 
 
 def refracted(direction: ArrayLike, pressure_hpa: ArrayLike, temperature_c: ArrayLike) -> NDArray[np.float64]:

@@ -71,11 +71,7 @@ class Folder:
 
     def record(self, file: str, kind: type[R]) -> R:
         """Record of a complete TOML file."""
-        document = toml_of(self.text(file), file)
-        try:
-            return kind.model_validate(document)
-        except ValidationError as problem:
-            raise refusal(file, explained(problem, document, kind)) from problem
+        return record_of_text(self.text(file), file, kind)
 
     def table(self, file: str, kind: type[R]) -> list[R]:
         """Rows of a CSV file with a header, as records."""
@@ -107,6 +103,15 @@ def read_record(path: Path | str, kind: type[R]) -> R:
     """Record of one TOML file at any path."""
     path = Path(path)
     return Folder(path.parent).record(path.name, kind)
+
+
+def record_of_text(text: str, file: str, kind: type[R]) -> R:
+    """Record of a TOML text; the file's name is for the refusal."""
+    document = toml_of(text, file)
+    try:
+        return kind.model_validate(document)
+    except ValidationError as problem:
+        raise refusal(file, explained(problem, document, kind)) from problem
 
 
 def column(values: Sequence[float], kind: type[np.number]) -> np.ndarray:

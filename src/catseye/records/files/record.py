@@ -25,6 +25,10 @@ class Record(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
+    def __repr_args__(self) -> list[tuple[str | None, Any]]:
+        """Fields of the short form that people see: those that have a value."""
+        return [(name, value) for name, value in super().__repr_args__() if value is not None]
+
 
 class Certificate(Record):
     """Calibration with its provenance; missing provenance in format version 1 reads as None.

@@ -22,10 +22,15 @@ NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 OTHER_UNITS = (
     ("_mm", 1e3, 0.0, "metres"),
     ("_m", 1e-3, 0.0, "millimetres"),
+    ("_mm", 25.4, 0.0, "inches"),
+    ("_mm", 304.8, 0.0, "feet"),
     ("_rad", DEGREE, 0.0, "degrees"),
     ("_c", 1.0, -ZERO_CELSIUS_K, "kelvin"),
+    ("_c", 5.0 / 9.0, -160.0 / 9.0, "degrees Fahrenheit"),
     ("_mb", 1e-2, 0.0, "pascals"),
     ("_mb", 10.0, 0.0, "kilopascals"),
+    ("_mb", 1.333224, 0.0, "mmHg"),
+    ("_mb", 33.86389, 0.0, "inches of mercury"),
     ("_um", 1e-3, 0.0, "nanometres"),
     ("_volt", 1e-3, 0.0, "millivolts"),
     ("_hz", 1e6, 0.0, "megahertz"),
@@ -41,6 +46,8 @@ EXPECTED = {
     "model_type": "a table",
     "model_attributes_type": "a table",
     "date_type": "a date",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
 }
 
 
@@ -120,7 +127,8 @@ def worded(error: Any, key: str, parent: Any, kind: "type[Record]") -> str:
     if name == "extra_forbidden":
         keys = all_keys(kind)
         close = difflib.get_close_matches(key[:LONGEST_VALUE], keys, n=1)
-        return f"{written} is not a known key (expected {f'perhaps {close[0]}' if close else 'no such key'})"
+        hint = f"perhaps {close[0]}" if close else "no such key"
+        return f"{written} is not a known key (expected {'in another table' if key in keys else hint})"
     if name in ("range", "length"):
         size = f" has the length {context['size']:.6g}" if name == "length" else ""
         return f"{written}{size}{other_unit(key, context)} ({error['msg']})"

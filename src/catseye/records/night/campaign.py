@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from catseye.constants import SECONDS_PER_DAY
+from catseye.constants import SECONDS_PER_DAY, SPEED_OF_LIGHT
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import in_row, refusal, shown
 from catseye.records.files.verdicts import verdict_of_export
@@ -16,7 +16,14 @@ from catseye.records.night.jitter import JITTER, JitterRow, JitterTable, jitter_
 from catseye.records.night.live import LivePosture
 from catseye.records.night.path_temperature import PathTemperature, PathTemperatureTable, path_temperature_columns
 from catseye.records.night.postures import POSTURES, PostureRow, postures_of
-from catseye.records.night.shot import ShotColumns, ShotRow, read_buffers, refuse_shots, shot_columns
+from catseye.records.night.shot import (
+    ShotColumns,
+    ShotRow,
+    read_buffers,
+    read_shots,
+    refuse_shots,
+    shot_columns,
+)
 from catseye.records.night.weather import Weather, WeatherSample, weather_columns
 from catseye.records.site.folder import (
     REFERENCE,
@@ -52,6 +59,21 @@ class ObservedSite(SiteFolder):
     doubt_notes: tuple[str, ...] = ()
     verdict: Verdict | None = None
 
+    @property
+    def several_frequencies(self) -> bool:
+        """True where shots have modulation frequencies of their own."""
+        return self.shots.modulation_hz is not None
+
+    def modulation_of(self, shots: np.ndarray) -> np.ndarray:
+        """Modulation frequencies (m,), Hz, of shots by their index."""
+        if self.shots.modulation_hz is None:
+            return np.full(len(shots), self.site.ranging.modulation_hz)
+        return np.asarray(self.shots.modulation_hz[shots])
+
+    def half_wavelengths(self, shots: np.ndarray) -> np.ndarray:
+        """Half wavelengths (m,) of the modulation in vacuum, m, of shots by their index."""
+        return 0.5 * SPEED_OF_LIGHT / self.modulation_of(shots)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Campaign(ObservedSite):
@@ -74,7 +96,7 @@ def read_campaign(directory: Path | str) -> Campaign:
     refuse_directory(folder.directory, "campaign")
     records = read_records(folder)
     samples = folder.table("weather.csv", WeatherSample)
-    shots = folder.table("shots.csv", ShotRow)
+    shots = read_shots(folder)
     buffers = read_buffers(folder)
     sounded = os.path.lexists(folder.directory / PATH_TEMPERATURES)
     lines = folder.table(PATH_TEMPERATURES, PathTemperature) if sounded else []
@@ -97,6 +119,7 @@ def read_campaign(directory: Path | str) -> Campaign:
     refuse_weather(samples, [station.name for station in campaign.site.weather_station])
     refuse_shots("shots.csv", shots, buffers)
     refuse_unknown_names(campaign, shots)
+    refuse_frequencies(campaign)
     refuse_times(campaign, shots)
     refuse_path_temperatures(campaign, lines)
     refuse_doubts(doubts, shots, samples)
@@ -125,6 +148,26 @@ def refuse_unknown_names(campaign: Campaign, shots: Iterable[ShotRow]) -> None:
     targets, rangers = set(campaign.target_names), set(campaign.rangers)
     for row, shot in enumerate(shots, start=1):
         refuse_unknown_ends("shots.csv", row, shot, targets=targets, rangers=rangers)
+
+
+def refuse_frequencies(campaign: ObservedSite) -> None:
+    """Raise InputError for a sheet that repeats the site's frequency, and for a shot whose frequency no record has."""
+    usual = campaign.site.ranging.modulation_hz
+    for zp, mirror in campaign.mirrors.items():
+        if any(further.modulation_hz == usual for further in mirror.frequency):
+            text = f"frequency: modulation_hz = {usual:.10g} is that of site.toml (expected further ones)"
+            raise refusal(f"mirrors/{zp}.toml", text)
+    fired = [] if campaign.shots.modulation_hz is None else campaign.shots.modulation_hz.tolist()
+    frequencies = {
+        ranger: [usual, *(further.modulation_hz for further in campaign.mirror_of(ranger).frequency)]
+        for ranger in set(campaign.shots.ranger)
+    }
+    for row, (hz, ranger) in enumerate(zip(fired, campaign.shots.ranger, strict=False), start=1):
+        if hz not in frequencies[ranger]:
+            sheet = f"mirrors/{campaign.mirror_of(ranger).zp}.toml"
+            listed = ", ".join(f"{value:.10g}" for value in frequencies[ranger])
+            text = f"modulation_hz = {hz:.10g} is neither site.toml's nor a frequency of {sheet}"
+            raise in_row("shots.csv", row, f"{text} (expected one of {listed})")
 
 
 def refuse_weather(samples: Iterable[WeatherSample], stations: list[str]) -> None:

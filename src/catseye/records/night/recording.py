@@ -134,11 +134,12 @@ class AcousticSheet(Certificate):
     clock_offset_us, u_clock_offset_us   lead of the clock of channel "ab" over that of the emission, and lag of
                            channel "ba", with two recorders; 0 with a common clock
     u_time_us              least standard uncertainty of a travel time: turbulence, converter
-    u_pressure_hpa, u_humidity_percent   of the weather readings, common to all
+    u_pressure_hpa, u_humidity_percent   of the weather readings, common to all; if missing a logger's own
     crosswind_m_per_s, u_crosswind_m_per_s   wind across the path; without an anemometer 0 and the site's rms wind
     wind_m_per_s, u_wind_m_per_s   wind along a path measured one way only, positive from ranger to target
     speed_gradient_per_s, u_speed_gradient_per_s   change of the speed of sound across the path: rays bend
-    frequency_hz           frequency of the sound, for the air's dispersion; by default the signal's
+    frequency_hz           frequency of the sound, for the air's dispersion; by default the signal's; needed for a table
+                           without `[signal]`, where 0 means a speed at zero frequency
     weighting              weighting of the correlation; "phat" is the phase transform
     band_hz                lowest and highest frequency used in the correlation
     interval_s             time between two signals, longer than the window
@@ -146,7 +147,7 @@ class AcousticSheet(Certificate):
     signal                 reference signal
     co2_ppm                carbon dioxide in the air
     wavelength_um          wavelength of the light, for the group refractivity of the path
-    weather                readings near the path
+    weather                readings near the path; if missing the table's columns, a logger's table or one reading
     """
 
     format: Annotated[int | str, Version("acoustic")] = 1
@@ -167,8 +168,8 @@ class AcousticSheet(Certificate):
     clock_offset_us: Microseconds = 0.0
     u_clock_offset_us: UMicroseconds = 0.0
     u_time_us: UMicroseconds = 0.0
-    u_pressure_hpa: Annotated[float, Within(0, 50)]
-    u_humidity_percent: Annotated[float, Within(0, 50)]
+    u_pressure_hpa: Annotated[float, Within(0, 50)] | None = None
+    u_humidity_percent: Annotated[float, Within(0, 50)] | None = None
     crosswind_m_per_s: Wind = 0.0
     u_crosswind_m_per_s: UWind
     wind_m_per_s: Wind | None = None
@@ -180,7 +181,7 @@ class AcousticSheet(Certificate):
     wavelength_um: Annotated[float, Within(0.3, 2.0)] = 0.780
     weighting: Literal["plain", "whitened", "phat"] = "plain"
     band_hz: Annotated[tuple[float, float], Field(strict=False)] | None = None
-    weather: Annotated[tuple[AcousticWeather, ...], Field(strict=False, min_length=1)]
+    weather: Annotated[tuple[AcousticWeather, ...], Field(strict=False)] = ()
 
     @model_validator(mode="after")
     def _belongs_together(self) -> "AcousticSheet":
@@ -201,15 +202,6 @@ class AcousticSheet(Certificate):
     def start_of(self, file: str) -> float | None:
         """Start time of a file, MJD; None if not in the sheet."""
         return next((item.start_mjd_utc for item in self.recordings if item.file == file), None)
-
-    def weather_at(self, mjd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Temperature °C, pressure hPa, humidity %, each (k,): linear in time, constant beyond the ends."""
-        times = [reading.mjd_utc for reading in self.weather]
-        columns = ("temperature_c", "pressure_hpa", "humidity_percent")
-        first, second, third = (
-            np.interp(mjd, times, [getattr(reading, name) for reading in self.weather]) for name in columns
-        )
-        return first, second, third
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,9 +48,27 @@ class ShotRow(Record):
         return self
 
 
+class TunedShotRow(ShotRow):
+    """Row of a shots.csv with several modulation frequencies: other columns are in `ShotRow`.
+
+    modulation_hz   frequency of the modulation at this shot: site.toml's, or a further one of the ranger's sheet
+    """
+
+    modulation_hz: Annotated[float, Within(1e6, 1e11)]
+
+
+def read_shots(folder: Folder, file: str = "shots.csv") -> Sequence[ShotRow]:
+    """Rows of the shots' table, with the column `modulation_hz` where its header has it."""
+    header = folder.text(file).partition("\n")[0]
+    return folder.table(file, TunedShotRow if "modulation_hz" in header else ShotRow)
+
+
 @dataclass(frozen=True, eq=False)
 class ShotColumns:
-    """All shots in file order, as read-only columns."""
+    """All shots in file order, as read-only columns.
+
+    modulation_hz   of each shot; None where all have the site's
+    """
 
     shot: np.ndarray
     mjd_utc: np.ndarray
@@ -59,6 +77,7 @@ class ShotColumns:
     cycles: np.ndarray
     samples_per_cycle: np.ndarray
     frame: np.ndarray
+    modulation_hz: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.ranger)
@@ -73,6 +92,9 @@ def shot_columns(shots: Sequence[ShotRow]) -> ShotColumns:
         cycles=column([shot.cycles for shot in shots], np.int64),
         samples_per_cycle=column([shot.samples_per_cycle for shot in shots], np.int64),
         frame=column([shot.frame for shot in shots], np.int64),
+        modulation_hz=column([s.modulation_hz for s in shots if isinstance(s, TunedShotRow)], np.float64)
+        if any(isinstance(s, TunedShotRow) for s in shots)
+        else None,
     )
 
 

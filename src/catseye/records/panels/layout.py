@@ -1,6 +1,5 @@
 """Corners of each panel: a table of the layout, or derived from the prisms of a site."""
 
-import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -180,10 +179,3 @@ def layout_of_site(site: SiteFolder) -> PanelLayout:
         raise refusal("targets.toml", f"prism {shown(names[unused[0]])} is not a panel's corner ({len(unused)} such)")
     _refuse_flat(layout, "targets.toml")
     return layout
-
-
-def aperture(layout: PanelLayout) -> float:
-    """Area of all panels projected along the axis, m²."""
-    four = layout.xy[layout.quad]
-    after = np.roll(four, -1, axis=1)
-    return 0.5 * math.fsum(np.sum(four[..., 0] * after[..., 1] - four[..., 1] * after[..., 0], axis=1))

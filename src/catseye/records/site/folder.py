@@ -5,8 +5,9 @@ A campaign's directory is also a site's; files of its night only are then not re
 
 import csv
 import io
+import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -18,17 +19,22 @@ from catseye.records.files.toml_text import record_toml
 from catseye.records.site.mirror import Mirror
 from catseye.records.site.monument import MonumentRecord
 from catseye.records.site.site import SiteRecord
+from catseye.records.site.structural_model import StructuralModel, structural_model_toml
 from catseye.records.site.target import BenchmarkRow, FeedArm, TargetRow, Targets
 from catseye.records.site.triplet import TripletRecord
 
 T = TypeVar("T")
 
 REFERENCE = "ZRG"  # target name of the ranger's internal cube
+STRUCTURAL_MODEL = "structural-model.toml"  # of the site's telescope, if the directory has one
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SiteFolder:
-    """Content of a site's directory; `hashes` are the SHA-256 of its files by relative path."""
+    """Content of a site's directory; `hashes` are the SHA-256 of its files by relative path.
+
+    `structure` is the structural model of its telescope; None of a rigid one.
+    """
 
     directory: Path
     site: SiteRecord
@@ -39,6 +45,7 @@ class SiteFolder:
     triplets: dict[str, TripletRecord]
     benchmarks: tuple[BenchmarkRow, ...]
     hashes: dict[str, str]
+    structure: StructuralModel | None = field(default=None, kw_only=True)
 
     def __repr__(self) -> str:
         return (
@@ -58,6 +65,11 @@ class SiteFolder:
         prisms_and_balls = (name for triplet in self.triplets.values() for name in triplet.targets)
         return tuple(sorted([*self.targets, *prisms_and_balls, *self.rangers, REFERENCE]))
 
+    @property
+    def triplet_of(self) -> dict[str, str]:
+        """Triplet of each of its targets."""
+        return {target: name for name, triplet in self.triplets.items() for target in triplet.targets}
+
     def mirror_of(self, ranger: str) -> Mirror:
         mounted = mounts(self.monuments, self.feedarm)
         if ranger not in mounted:
@@ -76,6 +88,7 @@ class SiteRecords:
     targets: tuple[TargetRow, ...]
     triplets: dict[str, TripletRecord]
     benchmarks: list[BenchmarkRow]
+    structure: StructuralModel | None = None
 
     def named(self, folder: Folder) -> dict[str, Any]:
         """Fields of a `SiteFolder`, records by name; `hashes` are those of the files read so far."""
@@ -91,6 +104,7 @@ class SiteRecords:
             "triplets": by_stem("triplet", {file: (record.triplet, record) for file, record in self.triplets.items()}),
             "benchmarks": tuple(self.benchmarks),
             "hashes": dict(sorted(folder.hashes.items())),
+            "structure": self.structure,
         }
 
 
@@ -109,6 +123,7 @@ def read_site(directory: Path | str) -> SiteFolder:
 
 def read_records(folder: Folder) -> SiteRecords:
     """Records of a site's files, each valid on its own."""
+    bent = os.path.lexists(folder.directory / STRUCTURAL_MODEL)
     return SiteRecords(
         site=folder.record("site.toml", SiteRecord),
         monuments={file: folder.record(file, MonumentRecord) for file in folder.records_in("monuments")},
@@ -117,6 +132,7 @@ def read_records(folder: Folder) -> SiteRecords:
         targets=folder.record("targets.toml", Targets).target,
         triplets={file: folder.record(file, TripletRecord) for file in folder.records_in("triplets")},
         benchmarks=folder.table("benchmarks.csv", BenchmarkRow),
+        structure=folder.record(STRUCTURAL_MODEL, StructuralModel) if bent else None,
     )
 
 
@@ -218,6 +234,7 @@ def site_files(site: SiteFolder) -> dict[str, str]:
         "targets.toml": record_toml(Targets(target=tuple(site.targets.values()))),
         **{f"triplets/{name}.toml": record_toml(record) for name, record in site.triplets.items()},
         "benchmarks.csv": _table_csv(site.benchmarks, BenchmarkRow),
+        **({} if site.structure is None else {STRUCTURAL_MODEL: structural_model_toml(site.structure)}),
     }
 
 

@@ -86,6 +86,7 @@ class FeedArmRanger(Record):
 
     u_position_mm   of each coordinate of the scan point; by default the reduction's setting, 10 mm
     mount_z, mount_y  directions of the mount's z^ (fixed point to v-block) and y^ (up), reflector frame; both or none
+    u_mount_rad     of the mount's turn about each axis; without it the u of encoder counts is unknown
     name            name of the ranger
     zp              name of its mirror
     nominal_scan_point_mm  nominal position of the scan point
@@ -97,6 +98,7 @@ class FeedArmRanger(Record):
     u_position_mm: PositionUncertainty | None = None
     mount_z: UnitVector | None = None
     mount_y: UnitVector | None = None
+    u_mount_rad: Annotated[float, Within(0, 0.1)] | None = None
 
     @model_validator(mode="after")
     def _has_perpendicular_axes(self) -> "FeedArmRanger":

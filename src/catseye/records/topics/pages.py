@@ -14,6 +14,7 @@ from catseye.records.topics.markup import has_prose, linked_pages, page_title, p
 NEAR = 3  # names that a refusal proposes
 INCLUDE = re.compile(r"(?ms)^```\{include\} +(\S+)\n.*?^```$")
 LIKENESS = 0.6  # of a proposed name, as difflib measures it
+ALIKE = 0.9  # above it a name is mistyped, and no other is meant
 
 
 @dataclass(frozen=True)
@@ -136,5 +137,7 @@ def _near(name: str, names: list[str]) -> list[str]:
     for topic in names:
         ends.setdefault(topic.rpartition("/")[2], []).append(topic)
     words = get_close_matches(name.rpartition("/")[2], list(ends), NEAR, LIKENESS)
+    if len(exact := get_close_matches(name, names, 1, ALIKE)) == 1:
+        return exact
     near = [*get_close_matches(name, names, NEAR, LIKENESS), *(topic for word in words for topic in ends[word])]
     return list(dict.fromkeys([*near, *(topic for topic in names if len(name) > 2 and name in topic)]))[:NEAR]

@@ -5,6 +5,8 @@ mean of those that meet there counts, which the tool measures to some µm whatev
 actuator under them moves all alike: that mean over the design is measured through the shaft's height, only as
 accurately as the lasers determine it. A height here is a departure: of the panel's surface from design offset and map,
 so that zero at all corners lays the panel's best fit on the design.
+
+Source: [PARKER04] chapter 11.
 """
 
 from collections.abc import Mapping

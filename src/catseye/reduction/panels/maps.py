@@ -1,4 +1,7 @@
-"""Coordinate measuring machine maps: best fit of a panel, and its shape."""
+"""Coordinate measuring machine maps: best fit of a panel, and its shape.
+
+Source: [PARKER04] chapter 11.
+"""
 
 from dataclasses import dataclass
 

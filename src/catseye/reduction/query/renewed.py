@@ -5,28 +5,31 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from catseye.errors import InputError
-from catseye.records.night.campaign import Campaign
+from catseye.records.night.campaign import Campaign, refuse_frequencies
 from catseye.records.site.folder import SiteFolder, mounts, refuse_unknown_ends
-from catseye.reduction.epoch.unknowns import (
+from catseye.reduction.epoch.prior_names import (
     BENCHMARKS,
     GLASS,
     HEADS,
+    LEAKAGE,
     MONUMENTS,
     OFFSETS,
     THERMOMETERS,
+    TRIPLET_AXES,
     TRIPLET_BALLS,
+    TRIPLET_SPACINGS,
     ZEROS,
 )
 
-LEAKAGE, SPACINGS, TRIPLET_AXES = "leakage", "triplet spacings", "triplet axes"  # priors without a name in `unknowns`
 HEAD_KEYS = {  # name of a prior -> keys of a mirror's sheet that it comes from
     ZEROS: ("d0_mm", "u_d0_mm"),
-    LEAKAGE: ("leakage_amplitude_volt", "leakage_phase_rad", "u_leakage_volt"),
+    LEAKAGE: ("leakage_amplitude_volt", "leakage_phase_rad", "u_leakage_volt", "frequency"),
     OFFSETS: ("dx_mm", "dy_mm", "dz_mm", "u_offset_mm", "beta1_rad", "beta2_rad", "u_beta_rad"),
     HEADS: (
         *("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm", "u_axis_mm"),
         *("amplitude_to_phase_rad", "u_amplitude_to_phase_rad"),
         *("cyclic_cosine_mm", "cyclic_sine_mm", "u_cyclic_mm"),
+        *("second_pass_cosine_per_volt", "second_pass_sine_per_volt", "u_second_pass_per_volt"),
     ),
 }
 
@@ -67,6 +70,7 @@ def with_records(campaign: Campaign, site: SiteFolder) -> Campaign:
             refuse_unknown_ends("shots.csv", row, line, targets=targets, rangers=rangers)
         except InputError as problem:
             raise InputError(f"{site.directory}: these records do not fit the night: {problem}") from problem
+    refuse_frequencies(renewed)
     return renewed
 
 
@@ -100,7 +104,7 @@ def calibrated_anew(old: SiteFolder, new: SiteFolder) -> dict[str, set[str]]:
         **{group: _differing(_parts(heads, keys), _parts(new_heads, keys)) for group, keys in HEAD_KEYS.items()},
         MONUMENTS: _differing(old.monuments, new.monuments),
         TRIPLET_BALLS: of_triplets,
-        SPACINGS: of_triplets,
+        TRIPLET_SPACINGS: of_triplets,
         TRIPLET_AXES: of_triplets,
         GLASS: of_triplets | _differing(old.targets, new.targets),
         BENCHMARKS: _differing(_by_target(old), _by_target(new)),

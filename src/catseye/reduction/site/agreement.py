@@ -1,8 +1,8 @@
 """Comparison of two records of one quantity.
 
-Barometers, hygrometers, a typed distance and the coordinates of its ends. Pure functions: numbers in, disagreements
-out. A disagreement accuses one of the two only where something decides between them: a pressure that, reduced to
-sea level by the standard air, weather has never reached.
+Barometers, hygrometers, a typed distance and the coordinates of its ends. A disagreement accuses one of the two only
+where something decides between them: a pressure that, reduced to sea level by the standard air, weather has never
+reached.
 """
 
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ import numpy as np
 from catseye.atmosphere.weather.barometer import carried_pressure
 from catseye.atmosphere.weather.humidity import relative_humidity_percent, vapour_pressure_hpa
 from catseye.constants import MILLIMETRE
+from catseye.records.night.campaign import ObservedSite
 
 SURE = 5.0  # standard uncertainties of a difference beyond which two records disagree
 U_BAROMETER_HPA = 0.3  # chosen: an electronic barometer some years after its certificate
@@ -80,6 +81,26 @@ class Disagreement:
         return f"the {self.what} of {self.first} and {self.second} disagree by {size}: {self.reason}"
 
 
+def station_series(campaign: ObservedSite) -> list[StationSeries]:
+    """Readings of each of a campaign's stations that has any."""
+    weather = campaign.weather
+    names, series = np.array(weather.station), []
+    for station in campaign.site.weather_station:
+        rows = names == station.name
+        if rows.any():
+            series.append(
+                StationSeries(
+                    name=station.name,
+                    elevation_m=station.elevation_m,
+                    mjd=weather.mjd_utc[rows],
+                    temperature_c=weather.temperature_c[rows],
+                    pressure_hpa=weather.pressure_hpa[rows],
+                    humidity_percent=weather.humidity_percent[rows],
+                )
+            )
+    return series
+
+
 def weather_disagreements(stations: Sequence[StationSeries]) -> tuple[Disagreement, ...]:
     """Contradictory barometers and hygrometers of each two stations.
 
@@ -87,9 +108,9 @@ def weather_disagreements(stations: Sequence[StationSeries]) -> tuple[Disagreeme
     """
     result = []
     for first, second in combinations(stations, 2):
-        pair = _simultaneous(first, second)
+        pair = simultaneous(first, second)
         if pair is not None:
-            result += [conflict for conflict in (_barometers(*pair), _hygrometers(*pair)) if conflict is not None]
+            result += [conflict for conflict in (barometers(*pair), _hygrometers(*pair)) if conflict is not None]
     return tuple(result)
 
 
@@ -134,7 +155,7 @@ def _factor(ratio: float) -> str:
     return "undecided which is wrong"
 
 
-def _simultaneous(first: StationSeries, second: StationSeries) -> tuple[StationSeries, StationSeries] | None:
+def simultaneous(first: StationSeries, second: StationSeries) -> tuple[StationSeries, StationSeries] | None:
     """Both series at the times of the first within the second's.
 
     None without such times.
@@ -149,7 +170,7 @@ def _simultaneous(first: StationSeries, second: StationSeries) -> tuple[StationS
     return replace(first, mjd=when, **first_columns), replace(second, mjd=when, **second_columns)
 
 
-def _barometers(first: StationSeries, second: StationSeries) -> Disagreement | None:
+def barometers(first: StationSeries, second: StationSeries) -> Disagreement | None:
     """Contradiction of two barometers.
 
     The first's pressure reduced to the second's elevation, against its reading there.
@@ -166,7 +187,10 @@ def _barometers(first: StationSeries, second: StationSeries) -> Disagreement | N
     difference = float(np.mean(reduced_pressure.pressure_hpa - second.pressure_hpa))
     if not abs(difference) > SURE * u:
         return None
-    reduced = {station.name: _at_sea_level(station) for station in (first, second)}
+    reduced = {
+        station.name: sea_level_pressure(float(np.mean(station.pressure_hpa)), station.elevation_m)
+        for station in (first, second)
+    }
     impossible = [name for name, p in reduced.items() if not SEA_LEVEL_HPA[0] <= p <= SEA_LEVEL_HPA[1]]
     if len(impossible) == 1:
         reason = (
@@ -196,11 +220,14 @@ def _barometers(first: StationSeries, second: StationSeries) -> Disagreement | N
     )
 
 
-def _at_sea_level(station: StationSeries) -> float:
-    """Mean pressure reduced to sea level by the standard atmosphere, hPa."""
-    here_c = STANDARD_C - STANDARD_LAPSE * station.elevation_m
-    mean = float(np.mean(station.pressure_hpa))
-    return float(carried_pressure(mean, here_c, station.elevation_m, z_to=0.0).pressure_hpa)
+def sea_level_pressure(pressure_hpa: float, elevation_m: float) -> float:
+    """Pressure reduced to sea level by the standard atmosphere, hPa.
+
+    >>> round(sea_level_pressure(920.0, 804.0), 1)
+    1012.9
+    """
+    here_c = STANDARD_C - STANDARD_LAPSE * elevation_m
+    return float(carried_pressure(pressure_hpa, here_c, elevation_m, z_to=0.0).pressure_hpa)
 
 
 def _hygrometers(first: StationSeries, second: StationSeries) -> Disagreement | None:

@@ -1,13 +1,15 @@
 """Motion of a telescope's points by its postures.
 
-Between two readings, and from an epoch to a shot: a rigid telescope on a perfect track, [PARKER04] eq. 2.44. Departures
-of the real one are left to the solution; their rate of change is an uncertainty of the filter state.
+Between two readings, and from an epoch to a shot: a telescope on a perfect track, [PARKER04] eq. 2.44, rigid or bent by
+its structural model. Departures of the real one are left to the solution; their rate of change is an uncertainty of the
+filter state.
 """
 
 import math
 from bisect import bisect_right, insort
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -245,6 +247,33 @@ def ground_from(site: SiteFolder, frame: str, azimuth: ArrayLike, elevation: Arr
     return Transforms(GROUND, GROUND, np.eye(3), np.zeros((*np.shape(azimuth), 3)))
 
 
+class Bending(Protocol):
+    """Bending of a telescope away from the rigid one: `reduction.structure.site_bending`."""
+
+    def body(self, name: str) -> str:
+        """Name shared by points that move as one; "" on the ground."""
+
+    def motion(self, body: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
+        """Motion (...) of a body away from the rigid telescope, ground axes."""
+
+
+def bent_ground_from(
+    site: SiteFolder, frame: str, body: str, azimuth: ArrayLike, elevation: ArrayLike, bending: Bending | None
+) -> Transforms:
+    """Transform to ground from a frame at postures (...), rad, of a body that bends.
+
+    frame     of the site's records
+    body      of `Bending.body`; of no effect without a bending
+    bending   None of a rigid telescope
+
+    Source: [PARKER04] section 2.6, first and second order.
+    """
+    rigid = ground_from(site, frame, azimuth, elevation)
+    if bending is None or frame == GROUND or not body:
+        return rigid
+    return bending.motion(body, azimuth, elevation) @ rigid
+
+
 def frames_of(site: SiteFolder) -> dict[str, str]:
     """Frame of each point of a site: rangers, fixed points, targets."""
     on_ground = [*site.monuments, *(f"{name}-F" for name in site.monuments)]
@@ -283,6 +312,7 @@ class TelescopeCarrier:
     bodies      name: its body, where that is not the ground
     jitter_mm   body: deviation of its points at a shot from their mean place
     lasting     constant share of the standard deviation of a path's index: a parameter of the line
+    bending     of the telescope by its structural model; None of a rigid one
     """
 
     site: SiteFolder
@@ -292,6 +322,17 @@ class TelescopeCarrier:
     bodies: Mapping[str, str] = field(default_factory=dict)
     jitter_mm: Mapping[str, float] = field(default_factory=dict)
     lasting: float = 0.0
+    bending: Bending | None = None
+
+    def body(self, name: str) -> str:
+        """Name shared by the points that move as one with a point; "" on the ground."""
+        if self.frames[name] == GROUND:
+            return ""
+        return self.frames[name] if self.bending is None else self.bending.body(name)
+
+    def ground_from(self, name: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
+        """Transform to ground from a point's frame, where it is at rest, at postures (...), rad."""
+        return bent_ground_from(self.site, self.frames[name], self.body(name), azimuth, elevation, self.bending)
 
     def jitter(self, ranger: str, targets: tuple[str, ...]) -> Array:
         """Variance (m,), m^2, of ranges to targets by jitter.
@@ -305,10 +346,10 @@ class TelescopeCarrier:
 
         Of given places (3,), each in its own frame.
         """
-        if self.frames[a] == self.frames[b]:
+        if self.body(a) == self.body(b):
             return np.full(len(mjd), np.linalg.norm(places[b] - places[a]))
         azimuth, elevation = self.track.at(mjd)
-        ground_places = [ground_from(self.site, self.frames[n], azimuth, elevation).points(places[n]) for n in (a, b)]
+        ground_places = [self.ground_from(n, azimuth, elevation).points(places[n]) for n in (a, b)]
         return np.asarray(np.linalg.norm(ground_places[1] - ground_places[0], axis=-1))
 
     def carried(self, names: tuple[str, ...], mjd: Array) -> tuple[Array, Array]:
@@ -319,13 +360,11 @@ class TelescopeCarrier:
         Source: x(t) = M(t) M(epoch)^-1 x(epoch), M ground from the point's frame.
         """
         turn, shift = np.broadcast_to(np.eye(3), (len(names), 3, 3)).copy(), np.zeros((len(names), 3))
-        frame = np.array([self.frames[name] for name in names])
-        for moving in (ALIDADE, REFLECTOR):
-            rows = np.flatnonzero(frame == moving)
-            if not len(rows):
-                continue
+        body = np.array([self.body(name) for name in names])
+        for moving in sorted({*body.tolist()} - {""}):
+            rows = np.flatnonzero(body == moving)
             azimuth, elevation = self.track.at(np.append(mjd[rows], self.epoch))
-            ground_frames = ground_from(self.site, moving, azimuth, elevation)
+            ground_frames = self.ground_from(names[rows[0]], azimuth, elevation)
             turn[rows] = ground_frames.rotation[:-1] @ ground_frames.rotation[-1].T
             shift[rows] = ground_frames.translation[:-1] - turn[rows] @ ground_frames.translation[-1]
         return turn, shift

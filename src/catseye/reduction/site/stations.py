@@ -1,5 +1,6 @@
 """Mirror stations from records, and mirror counts for points: CAL.EQ."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from catseye.geometry.mirror.imperfect import (
     imperfect_counts,
     imperfect_face_counts,
 )
-from catseye.geometry.mirror.pointing import Aim, MirrorStation, aim, counts_covariance
+from catseye.geometry.mirror.pointing import Aim, MirrorStation, aim
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
@@ -32,6 +33,7 @@ UNUSUAL = 1e3  # m, six times the longest line of the Green Bank site: more like
 ANY_TURN = COUNTS_PER_TURN / np.sqrt(12.0)  # counts: unknown azimuth, uniform over a turn
 STEPS = {"axes": 1e-6, "tilts": 1e-7}  # m, rad, for derivatives
 AXES = ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")
+CountsSpread = Callable[[np.ndarray], tuple[np.ndarray, tuple[str, ...]]]
 TILTS = ("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad")
 
 
@@ -143,20 +145,31 @@ def station_covariance(monument: MonumentGeometry, mirror: MirrorGeometry) -> tu
     The records give one u each and no correlations.
     """
     lacking: list[str] = []
+    place = [_u(monument, f"u_{axis}_mm", lacking, MILLIMETRE) for axis in "xyz"]
+    turn = [_u(monument, f"u_alpha{k}_rad", lacking) for k in (1, 2, 3)]
+    of_mirror, lacking_of_mirror = mirror_variances(mirror)
+    return np.diag([*np.square([*place, *turn]), *of_mirror]), (*lacking, *lacking_of_mirror)
 
-    def u(record: object, key: str, factor: float = 1.0) -> float:
-        value = getattr(record, key)
-        if value is None:
-            lacking.append(key)
-            return 0.0
-        return float(value) * factor
 
-    place = [u(monument, f"u_{axis}_mm", MILLIMETRE) for axis in "xyz"]
-    turn = [u(monument, f"u_alpha{k}_rad") for k in (1, 2, 3)]
-    offset = [u(mirror, "u_offset_mm", MILLIMETRE)] * 3
-    beta = [u(mirror, "u_beta_rad")] * 2
-    zeros = [u(mirror, "u_zero_counts")] * 2
-    return np.diag(np.square([*place, *turn, *offset, *beta, *zeros])), tuple(lacking)
+def mirror_variances(mirror: MirrorGeometry) -> tuple[list[float], tuple[str, ...]]:
+    """Variances of the seven parameters of a mirror: offset, beta, zeros.
+
+    Also the keys that the record lacks: their parameters count as exact.
+    """
+    lacking: list[str] = []
+    offset = [_u(mirror, "u_offset_mm", lacking, MILLIMETRE)] * 3
+    beta = [_u(mirror, "u_beta_rad", lacking)] * 2
+    zeros = [_u(mirror, "u_zero_counts", lacking)] * 2
+    return np.square([*offset, *beta, *zeros]).tolist(), tuple(lacking)
+
+
+def _u(record: object, key: str, lacking: list[str], factor: float = 1.0) -> float:
+    """Standard uncertainty of a record; 0 where it lacks the key, which is then listed."""
+    value = getattr(record, key)
+    if value is None:
+        lacking.append(key)
+        return 0.0
+    return float(value) * factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,15 +208,20 @@ class Pointings:
         return f"the point is {self.aim.range[k]:.0f} m away; in millimetres it would be {less} m"
 
 
-def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) -> Pointings:
-    """Encoder counts of one mirror for points (n, 3), m, ground.
+def pointings_of(
+    station: MirrorStation, mirror: MirrorGeometry, to: np.ndarray, *, name: str, spread: CountsSpread
+) -> Pointings:
+    """Encoder counts of a station's mirror for points (n, 3), m, ground.
+
+    name     of the ranger, for refusals
+    spread   covariance (n, 2, 2) of the counts for points by the station, and the keys that the records lack
 
     Raises InputError for a point that has no direction, is farther than FARTHEST, or that the beam of this mirror
     cannot reach.
 
     Source: [PARKER04] Figure 2.5 (CAL.EQ), eq. 2.12 to 2.26.
     """
-    station, imperfections = station_of(monument, mirror), imperfections_of(mirror)
+    imperfections = imperfections_of(mirror)
     for at in to[~np.all(np.abs(to) <= FARTHEST, axis=1)]:
         less = at * MILLIMETRE
         hint = (
@@ -227,15 +245,14 @@ def point(monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray) ->
     for k in np.flatnonzero(~np.isfinite(np.column_stack([direct, prime, face, back])).all(axis=1)):
         raise InputError(
             f"point {', '.join(f'{v:.10g}' for v in to[k])} m, {aimed.range[k]:.4g} m from the scan point of "
-            f"{mirror.zp} on {monument.monument}, {np.degrees(aimed.phi[k]):.4g} deg from its azimuth axis: no setting "
+            f"{mirror.zp} on {name}, {np.degrees(aimed.phi[k]):.4g} deg from its azimuth axis: no setting "
             "of the mirror looks there"
         )
     lower = prime[:, 0] - COUNTS_PER_TURN
     down = ~within(prime[:, 0], low, high) & within(lower, low, high)
     prime = np.column_stack([np.where(down, lower, prime[:, 0]), prime[:, 1]])
-    covariance, lacking = station_covariance(monument, mirror)
-    spread = counts_covariance(station, to, of_station=covariance)
-    variance = np.diagonal(spread, axis1=-2, axis2=-1) + imperfections_variance(station, mirror, to)
+    covariance, lacking = spread(to)
+    variance = np.diagonal(covariance, axis1=-2, axis2=-1) + imperfections_variance(station, mirror, to)
     u = np.sqrt(variance)
     u[:, 0] = np.fmin(u[:, 0], ANY_TURN)
     return Pointings(

@@ -8,6 +8,7 @@ import numpy as np
 from catseye.simulator.night.air import TrueAir
 from catseye.simulator.night.lag import lagged
 from catseye.simulator.night.limits import require
+from catseye.simulator.night.movements import BodyDrift, BodySway
 
 STEEL_PER_K = 11.7e-6  # structural steel: AISC, Steel Construction Manual, 6.5e-6 per degF
 STEP_S = 10.0  # a thirtieth of the shortest wave
@@ -48,6 +49,8 @@ class MovingPoints:
                   not in it stand on the ground
     dish_middle   (3,) m
     carried       names of points carried by the alidade: dish and arm
+    movements     of bodies
+    bodies        names of the points of each body
     """
 
     points: Mapping[str, np.ndarray]
@@ -57,6 +60,8 @@ class MovingPoints:
     own: Mapping[str, float] = field(default_factory=dict)
     dish_middle: np.ndarray = field(default_factory=lambda: np.zeros(3))
     carried: frozenset[str] = frozenset()
+    movements: tuple[BodySway | BodyDrift, ...] = ()
+    bodies: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     def scale(self, seconds):
         """Expansion of the telescope since `reference_s`, at times (k,).
@@ -72,10 +77,21 @@ class MovingPoints:
     def at(self, names: list[str], seconds):
         """Positions of points (k, 3), each at its own time (k,)."""
         initial = np.array([self.points[name] for name in names])
+        moved = self._moved(names, seconds)
         if self.law is None:
-            return initial
+            return initial + moved
         scale = self.scale(seconds)[:, None]
         rides = np.array([name in self.own for name in names])[:, None]
         extra = np.array([self.own.get(name, 0.0) for name in names])[:, None]
         lifted = self.law.alidade_share * np.array([name in self.carried for name in names])[:, None]
-        return initial + rides * scale * (initial + extra * (initial - self.dish_middle) + lifted * self.dish_middle)
+        grown = rides * scale * (initial + extra * (initial - self.dish_middle) + lifted * self.dish_middle)
+        return initial + grown + moved
+
+    def _moved(self, names: list[str], seconds):
+        """Displacements (k, 3) by the movements, m."""
+        moved = np.zeros((len(names), 3))
+        for movement in self.movements:
+            body = self.bodies.get(movement.body, frozenset([movement.body]))
+            members = np.array([name in body for name in names])[:, None]
+            moved += members * movement.displacement(seconds, self.reference_s)
+        return moved

@@ -71,12 +71,14 @@ class Planted:
     signs         effect -> factor on it, such as -1
     ignore        effects that do not happen
     d0_error_mm   ranger -> true D0 minus typed D0, on top of the calibration's own uncertainty
+    modulation_ppm   ranger -> its true modulation frequency minus the site's, ppm
     """
 
     shifts: Mapping[str, Sequence[float]] = field(default_factory=dict)
     signs: Mapping[str, float] = field(default_factory=dict)
     ignore: Collection[str] = frozenset()
     d0_error_mm: Mapping[str, float] = field(default_factory=dict)
+    modulation_ppm: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self):
         for effect in (*self.signs, *self.ignore):

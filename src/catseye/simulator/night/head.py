@@ -12,12 +12,11 @@ from catseye.simulator.night.air import TrueAir
 from catseye.simulator.night.expansion import MovingPoints
 from catseye.simulator.night.faults import Faults, Planted, Streams
 from catseye.simulator.night.glass import GLASS_TO_AIR, ball_delay, prism_delay
-from catseye.simulator.night.schedule import REFERENCE, ScheduledShot
+from catseye.simulator.night.schedule import MODULATION_HZ, REFERENCE, ScheduledShot
 from catseye.simulator.night.structure import TrueTarget, unit
 from catseye.simulator.night.warm_lines import WarmLine
-from catseye.simulator.night.world import TrueHead
+from catseye.simulator.night.world import U_LEAKAGE_VOLT, TrueHead
 
-MODULATION_HZ = 1.5e9
 RADIANS_PER_METRE = 2.0 * TWO_PI * MODULATION_HZ / SPEED_OF_LIGHT  # of one-way optical path
 VOLT_PER_CODE = 10.0 / 32768.0
 SAMPLES_PER_CYCLE, CYCLES = 64, 128
@@ -77,6 +76,34 @@ def electronic_phase(head: TrueHead, seconds, streams: Streams, *, planted: Plan
     walk = planted.gain("drift") * DRIFT_RAD_PER_ROOT_HOUR * np.cumsum(steps)
     transient = planted.gain("warm_up") * warms * rise * np.exp(-(seconds - seconds[0]) / 300.0)
     return start + walk + transient
+
+
+@dataclass(frozen=True)
+class TunedHead:
+    """Head at one modulation frequency: the leakage of its sheet, and the truth.
+
+    phase   rad, of the electronics after that at the usual frequency
+    """
+
+    modulation_hz: float
+    leakage_amplitude_volt: float
+    leakage_phase_rad: float
+    true_leakage: complex
+    phase: float
+
+
+def at_frequency(head: TrueHead, modulation_hz: float, streams: Streams, *, planted: Planted) -> TunedHead:
+    """Head at one modulation frequency; cables and crosstalk turn the phases of another by any angle."""
+    if modulation_hz == MODULATION_HZ:
+        return TunedHead(
+            modulation_hz, head.leakage_amplitude_volt, head.leakage_phase_rad, head.true_leakage, phase=0.0
+        )
+    rng = streams(f"head/{head.ranger}/{modulation_hz!r}")
+    amplitude = round(head.leakage_amplitude_volt * rng.uniform(0.8, 1.2), 5)
+    angle, phase = (float(v) for v in rng.uniform(0.0, TWO_PI, 2))
+    miss = planted.gain("calibration") * U_LEAKAGE_VOLT * complex(*rng.normal(size=2))
+    leakage = planted.gain("leakage") * (amplitude * np.exp(1j * round(angle, 4)) + miss)
+    return TunedHead(modulation_hz, amplitude, round(angle, 4), complex(leakage), phase)
 
 
 def usual_volt(name: str, draw: float) -> float:
@@ -152,12 +179,17 @@ def returns_of_ranger(
     end_index = air.index_at(ends, seconds)
     volt = {name: usual_volt(name, streams(f"path/{head.ranger}/{name}").uniform()) for name in targets}
     weak = faults.weak_amplitude if head.ranger == faults.weak_ranger else 1.0
+    oscillator = 1.0 + planted.modulation_ppm.get(head.ranger, 0.0) * PPM
+    tuned = {hz: at_frequency(head, hz, streams, planted=planted) for hz in {s.modulation_hz for s in shots}}
 
     returns = []
     for i, shot in enumerate(shots):
+        tune = tuned[shot.modulation_hz]
+        per_metre = RADIANS_PER_METRE * oscillator * (shot.modulation_hz / MODULATION_HZ)
+        electronics = phase_e[i] + tune.phase
         if shot.target == REFERENCE:
-            unit_phasor = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * end_index[i] * head.true_d0))
-            phasor = REFERENCE_VOLT * unit_phasor + head.true_leakage
+            unit_phasor = np.exp(1j * (electronics - per_metre * end_index[i] * head.true_d0))
+            phasor = REFERENCE_VOLT * unit_phasor + tune.true_leakage
             returns.append(
                 Return(shot=shot, phasor=complex(phasor), status="good", index=1.0, range=head.true_d0, phase_error=0.0)
             )
@@ -166,7 +198,7 @@ def returns_of_ranger(
         distance = float(np.linalg.norm(away))
         glass = glass_delay(targets[shot.target], unit(away), obliquity=planted.gain("obliquity"))
         path = index[i] * distance + end_index[i] * glass
-        unit_phasor = np.exp(1j * (phase_e[i] - RADIANS_PER_METRE * path))
+        unit_phasor = np.exp(1j * (electronics - per_metre * path))
         amplitude = volt[shot.target] * weak * flicker[i]
         status, remaining, strange = "good", complex(amplitude), 0j
         if fate[i] < faults.fraction_blocked:
@@ -175,7 +207,7 @@ def returns_of_ranger(
             status = "reflected"
             remaining, strange = foreign_return(amplitude, foreign[i])
         error = float(np.angle(remaining + strange)) if status == "reflected" else 0.0
-        phasor = unit_phasor * (remaining + strange) + head.true_leakage
+        phasor = unit_phasor * (remaining + strange) + tune.true_leakage
         returns.append(
             Return(
                 shot=shot,

@@ -9,6 +9,7 @@ from catseye.simulator.night.expansion import SteelExpansion
 from catseye.simulator.night.faults import Streams
 from catseye.simulator.night.fields import AirWave, Front, HorizontalGradient, PressureWave, Turbulence
 from catseye.simulator.night.limits import require
+from catseye.simulator.night.movements import BodyDrift, BodySway
 from catseye.simulator.night.stations import STATIONS, USUAL_INTERVAL_S, ReadingGap, StationNature
 
 STRONGEST = 10.0  # of `Nature.drawn`: waves of 4 degC
@@ -39,6 +40,7 @@ class Nature:
     wind_m_s        towards the east and the north; airs the thermometers
     batch_heights   common error of the glass heights of a batch of prisms, one sigma, in the sheet's u_height
     neighbours      share of a line's residual variance in common with neighbouring lines, 0 to 1
+    movements       of bodies from shot to shot, or steadily
 
     >>> Nature(waves=(AirWave(amplitude_c=0.3, period_s=2100.0),)).calm
     False
@@ -54,6 +56,7 @@ class Nature:
     expansion: SteelExpansion | None = None
     batch_heights: float = 0.0
     neighbours: float = 0.0
+    movements: tuple[BodySway | BodyDrift, ...] = ()
 
     def __post_init__(self):
         require("wind_m_s", float(np.hypot(*self.wind_m_s)), 0.0, 60.0)

@@ -1,12 +1,14 @@
 """Synthetic night: file contents and truth."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from catseye.simulator.night.air import AirConditions
+from catseye.simulator.night.head import TunedHead
 from catseye.simulator.night.nature import CALM, Nature
-from catseye.simulator.night.schedule import ScheduledShot
+from catseye.simulator.night.schedule import MODULATION_HZ, ScheduledShot
 from catseye.simulator.night.stations import WeatherReading
 from catseye.simulator.night.structure import Structure, TrueTarget
 from catseye.simulator.night.truth import Truth
@@ -39,3 +41,6 @@ class Night:
     truth: Truth
     sounded: tuple[Sounding, ...] = ()  # rows of path_temperatures.csv; no file without
     nature: Nature = CALM
+    modulation_hz: float = MODULATION_HZ  # as typed
+    tuned: Mapping[str, tuple[TunedHead, ...]] = field(default_factory=dict)  # heads at further frequencies, by ranger
+    lies: tuple[str, ...] = ()  # what is wrong on purpose

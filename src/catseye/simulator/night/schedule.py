@@ -14,6 +14,8 @@ from catseye.simulator.night.structure import Structure, unit
 from catseye.simulator.night.world import FEED_ARM_RANGERS, GROUND_RANGERS, TrueBenchmark, TrueMonument
 
 REFERENCE = "ZRG"
+MODULATION_HZ = 1.5e9
+LOWEST_HZ, HIGHEST_HZ = 1e9, 2e9  # of a detector and an oscillator made for 1500 MHz
 BUFFER_S = 0.128  # s, duration of a shot: 128 cycles of 1 kHz
 
 
@@ -29,6 +31,7 @@ class Schedule:
     ball_angle_deg    largest angle from the axis of a ball
     weak_share        share of the dish prisms that the weak ranger shoots
     again             repeats of each dish prism by a feed-arm ranger; a fraction is a share of the prisms
+    further_hz        further modulation frequencies: every shot is repeated at each, reference shots too
     """
 
     interval_s: float = 14.0
@@ -42,6 +45,7 @@ class Schedule:
     ground_repeats: int = 2
     certified_repeats: int = 4
     neighbour_repeats: int = 2
+    further_hz: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not BUFFER_S < self.interval_s <= 1000.0:
@@ -50,6 +54,13 @@ class Schedule:
             )
         if not 0.0 <= self.again <= 1000.0:
             raise ValidityError(f"again = {self.again:g} (expected 0 to 1000)")
+        modulations = (MODULATION_HZ, *self.further_hz)
+        for hz in self.further_hz:
+            if not LOWEST_HZ <= hz <= HIGHEST_HZ or modulations.count(hz) > 1:
+                raise ValidityError(
+                    f"modulation frequency {hz:.10g} Hz (expected {LOWEST_HZ:g} to {HIGHEST_HZ:g}, each once, "
+                    f"besides {MODULATION_HZ:g})"
+                )
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,7 @@ class ScheduledShot:
     seconds: float
     ranger: str
     target: str
+    modulation_hz: float = MODULATION_HZ
 
 
 def ground_targets(
@@ -116,6 +128,16 @@ def feed_arm_targets(
     return rangers + prisms + dish + repeats
 
 
+def at_frequencies(targets: list[str], interval: int, further_hz: Sequence[float]) -> list[tuple[str, float]]:
+    """Targets and modulation frequencies, block by block at one frequency after the other, between reference shots."""
+    if not further_hz:
+        return [(name, MODULATION_HZ) for name in with_references(targets, interval)]
+    blocks = [targets[i : i + interval] for i in range(0, len(targets), interval)]
+    return [
+        (name, hz) for block in blocks for hz in (MODULATION_HZ, *further_hz) for name in (REFERENCE, *block, REFERENCE)
+    ]
+
+
 def with_references(targets: list[str], interval: int) -> list[str]:
     """Targets with a reference shot first, last, and at an interval."""
     blocks = [targets[i : i + interval] for i in range(0, len(targets), interval)]
@@ -133,13 +155,13 @@ def plan_shots(rule: Schedule, shot_lists: dict[str, list[str]], streams: Stream
     for ranger, targets in shot_lists.items():
         rng = streams(f"schedule/{ranger}")
         order = [str(t) for t in rng.permutation(targets)] if targets else []
-        names = with_references(order, rule.reference_every)
+        names = at_frequencies(order, rule.reference_every, rule.further_hz)
         on_ground = ranger in GROUND_RANGERS
         room = rule.span_s - rule.interval_s * len(names)
         start = rng.uniform(40.0, max(room, 60.0) if on_ground else 0.3 * rule.span_s)
         times = start + rule.interval_s * np.arange(len(names)) + rng.uniform(-jitter, jitter, len(names))
         needs.append((start, len(names)))
-        plan[ranger] = [ScheduledShot(float(t), ranger, name) for t, name in zip(times, names, strict=True)]
+        plan[ranger] = [ScheduledShot(float(t), ranger, name, hz) for t, (name, hz) in zip(times, names, strict=True)]
     _refuse_long(rule, needs)
     return plan
 

@@ -13,11 +13,17 @@ from catseye.errors import InputError
 from catseye.records.site.retroreflector import GlassForm
 from catseye.simulator.night.air import ELEVATION_OF_Z0
 from catseye.simulator.night.glass import GLASS_TO_AIR
-from catseye.simulator.night.head import CYCLES, SAMPLES_PER_CYCLE
+from catseye.simulator.night.head import CYCLES, SAMPLES_PER_CYCLE, TunedHead
 from catseye.simulator.night.night import Night
 from catseye.simulator.night.stations import STATIONS
 from catseye.simulator.night.structure import TrueTarget, TrueTriplet
-from catseye.simulator.night.world import METRES_PER_DEGREE, SITE_LATITUDE_DEG, TrueHead, TrueMonument
+from catseye.simulator.night.world import (
+    METRES_PER_DEGREE,
+    SITE_LATITUDE_DEG,
+    U_LEAKAGE_VOLT,
+    TrueHead,
+    TrueMonument,
+)
 
 README = """# Measurement campaign, {name}
 
@@ -53,7 +59,7 @@ aperture_centre_mm = [0.000, 54000.000]
 aperture_radius_mm = 50000.000
 
 [ranging]
-modulation_hz = 1500000000.0
+modulation_hz = {modulation!r}
 if_hz = 1000.0
 wavelength_um = 0.780
 bk7_to_air_group_index_ratio = 1.527077   # value behind the tabulated glass constants
@@ -85,6 +91,7 @@ def prism_constants(height_mm: float, u_height_mm: float = 0.002) -> str:
 
 def monument_sheet(m: TrueMonument) -> str:
     x, y, z = m.fixed_point_mm
+    _, north, up = m.fixed_point_mm if m.levelled_mm is None else m.levelled_mm
     zero = "   # defines z = 0" if m.u_mm[2] == 0.0 else ""
     return (
         "# Laser monument calibration report\n"
@@ -95,8 +102,8 @@ def monument_sheet(m: TrueMonument) -> str:
         f"alpha1_rad = {m.alpha_rad[0]:.7f}       # pi - azimuth\n"
         f"alpha2_rad = {m.alpha_rad[1]:.7f}       # rotation about z^\n"
         f"alpha3_rad = {m.alpha_rad[2]:.7f}       # rotation about x^\n"
-        f"latitude_deg = {SITE_LATITUDE_DEG + y * MILLIMETRE / METRES_PER_DEGREE:.6f}\n"
-        f"elevation_m = {ELEVATION_OF_Z0 + z * MILLIMETRE:.3f}\n"
+        f"latitude_deg = {SITE_LATITUDE_DEG + north * MILLIMETRE / METRES_PER_DEGREE:.6f}\n"
+        f"elevation_m = {ELEVATION_OF_Z0 + up * MILLIMETRE:.3f}\n"
     )
 
 
@@ -113,6 +120,15 @@ def head_sheet(h: TrueHead) -> str:
         f"na0 = {h.na0}\nne0 = {h.ne0}\n"
         f"az_low_limit = {h.na0 - 24000}\naz_high_limit = {h.na0 + 73000}\n"
         f"azm_zrg = {h.na0 + 37500}\nelv_zrg = {h.ne0 + 24600}\n"
+    )
+
+
+def frequency_entry(tuned: TunedHead) -> str:
+    """Table of a further modulation frequency of a head's sheet."""
+    return (
+        f"\n[[frequency]]\nmodulation_hz = {tuned.modulation_hz!r}\n"
+        f"leakage_amplitude_volt = {tuned.leakage_amplitude_volt:.5f}\n"
+        f"leakage_phase_rad = {tuned.leakage_phase_rad:.4f}\nu_leakage_volt = {U_LEAKAGE_VOLT:.4f}\n"
     )
 
 
@@ -236,6 +252,7 @@ def _texts(night: Night) -> dict[str, str]:
             start=night.start_mjd_utc,
             azimuth=float(night.azimuth_deg),
             elevation=float(night.elevation_deg),
+            modulation=float(night.modulation_hz),
             fluctuation=float(night.conditions.index_fluctuation_ppm),
         )
         + "\n".join(station_entry(night, name) for name in STATIONS),
@@ -243,7 +260,10 @@ def _texts(night: Night) -> dict[str, str]:
         "targets.toml": TARGETS + "\n".join(target_entry(t) for t in night.single_targets),
     }
     texts |= {f"monuments/{name}.toml": monument_sheet(m) for name, m in night.monuments.items()}
-    texts |= {f"mirrors/{h.zp}.toml": head_sheet(h) for h in night.heads.values()}
+    texts |= {
+        f"mirrors/{h.zp}.toml": head_sheet(h) + "".join(map(frequency_entry, night.tuned.get(name, ())))
+        for name, h in night.heads.items()
+    }
     texts |= {f"triplets/{t.name}.toml": triplet_sheet(t) for t in night.telescope.triplets}
     return texts
 
@@ -287,9 +307,13 @@ def _write_tables(night: Night, directory: Path) -> None:
         )
     write_table(
         directory / "shots.csv",
-        "shot,mjd_utc,ranger,target,cycles,samples_per_cycle,frame",
+        "shot,mjd_utc,ranger,target,cycles,samples_per_cycle,frame" + ",modulation_hz" * bool(night.tuned),
         (
-            (i + 1, f"{start + s.seconds / SECONDS_PER_DAY:.9f}", s.ranger, s.target, CYCLES, SAMPLES_PER_CYCLE, i)
+            (
+                *(i + 1, f"{start + s.seconds / SECONDS_PER_DAY:.9f}", s.ranger, s.target),
+                *(CYCLES, SAMPLES_PER_CYCLE, i),
+                *((repr(s.modulation_hz),) if night.tuned else ()),
+            )
             for i, s in enumerate(night.shots)
         ),
     )

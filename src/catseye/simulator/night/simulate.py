@@ -1,17 +1,20 @@
 """Simulate a night: the campaign as in its files, and the truth."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from catseye.constants import DEGREE
 from catseye.errors import InputError, ValidityError
 from catseye.records.site.retroreflector import HOLLOW
+from catseye.records.site.structural_model import StructuralModel
 from catseye.simulator.night.air import NIGHT, AirConditions, TrueAir
 from catseye.simulator.night.batches import in_batches
-from catseye.simulator.night.expansion import MovingPoints, SteelExpansion
+from catseye.simulator.night.expansion import MovingPoints
 from catseye.simulator.night.faults import Faults, Planted, Streams
-from catseye.simulator.night.head import Return, returns_of_ranger, sampled_frames
+from catseye.simulator.night.head import Return, at_frequency, returns_of_ranger, sampled_frames
+from catseye.simulator.night.movements import ALIDADE, ARM, BODIES, DISH, TELESCOPE
 from catseye.simulator.night.natural_air import NaturalAir
 from catseye.simulator.night.nature import CALM, Nature
 from catseye.simulator.night.night import Night
@@ -39,6 +42,7 @@ from catseye.simulator.night.world import (
     head,
     monument,
 )
+from catseye.simulator.structure.bent_telescope import BentTelescope
 
 START_MJD_UTC = 52889.125
 
@@ -51,6 +55,7 @@ class SimulatedTelescope:
     elevation_deg   5 to 90
     dish_prisms     0 to 9999
     triplets        0 to 99
+    structure       model that bends it away from a rigid one; None: rigid, but for what the night draws
 
     Raises ValidityError beyond these.
     """
@@ -59,6 +64,7 @@ class SimulatedTelescope:
     elevation_deg: float = 30.0
     dish_prisms: int = 60
     triplets: int = 10
+    structure: StructuralModel | None = None
 
     def __post_init__(self) -> None:
         if not 5.0 <= self.elevation_deg <= 90.0:
@@ -119,7 +125,7 @@ def simulate_night(  # noqa: PLR0913 - what a night is made of, keyword-only
     stratification = planted.gain("stratification")
     air = TrueAir(conditions, stratification) if nature.calm else NaturalAir(conditions, stratification, nature)
     plan = _plan(site, rule, faults, streams)
-    moving = _moving(site, air, nature.expansion, plan)
+    moving = _moving(site, air, nature, plan)
     air_of = air_of_rangers(site.heads, site.points, air, warmth)
     returns = {
         r: returns_of_ranger(
@@ -168,6 +174,12 @@ def simulate_night(  # noqa: PLR0913 - what a night is made of, keyword-only
         truth=truth,
         sounded=soundings(air, warmth, site.points, streams=streams, until_s=until_s),
         nature=nature,
+        tuned={
+            r: tuple(at_frequency(site.heads[r], hz, streams, planted=planted) for hz in rule.further_hz)
+            for r in site.heads
+        }
+        if rule.further_hz
+        else {},
     )
 
 
@@ -190,16 +202,43 @@ def _site(
         faults=faults,
         planted=planted,
     )
+    if stands.structure is not None:
+        telescope = bent(telescope, BentTelescope(stands.structure), stands.azimuth_deg, stands.elevation_deg)
     telescope = in_batches(telescope, batch_heights, streams, planted)
     cubes = benchmark_targets(marks, streams, planted)
     targets = telescope.targets | {t.name: t for t in cubes}
     points = {r: m.true_scan_point for r, m in monuments.items()} | {t.name: t.point for t in targets.values()}
     points = shifted(points, planted)
-    for ranger in planted.d0_error_mm:
+    for ranger in (*planted.d0_error_mm, *planted.modulation_ppm):
         if ranger not in heads:
-            raise InputError(f"a D0 error planted on {ranger!r}: expected a ranger, ZY101 to ZY118")
+            raise InputError(f"an error planted on {ranger!r}: expected a ranger, ZY101 to ZY118")
     return NightSite(
         heads=heads, monuments=monuments, marks=marks, pose=pose, telescope=telescope, cubes=cubes, points=points
+    )
+
+
+def bent(telescope: Structure, by: BentTelescope, azimuth_deg: float, elevation_deg: float) -> Structure:
+    """Telescope with its targets moved and turned by a structural model.
+
+    Raises ValidityError outside the model's elevations.
+    """
+    azimuth, elevation = np.array([azimuth_deg * DEGREE]), np.array([elevation_deg * DEGREE])
+
+    def moved(target: TrueTarget, body: str) -> TrueTarget:
+        shift = by.shift(body, azimuth, elevation, target.name)
+        normal = None if target.normal is None else shift.turn[0] @ target.normal
+        return replace(target, point=shift.points(target.point)[0], normal=normal)
+
+    units = []
+    for one in telescope.triplets:
+        left, right, ball = (moved(target, "dish") for target in one.targets)
+        units.append(replace(one, targets=(left, right, ball)))
+    return replace(
+        telescope,
+        feed_arm={name: moved(target, "arm") for name, target in telescope.feed_arm.items()},
+        dish=[moved(target, "dish") for target in telescope.dish],
+        triplets=units,
+        structural=[moved(t, "arm" if t.frame == "reflector" else "alidade") for t in telescope.structural],
     )
 
 
@@ -212,13 +251,14 @@ def _plan(site: NightSite, rule: Schedule, faults: Faults, streams: Streams) -> 
     return plan_shots(rule, lists, streams)
 
 
-def _moving(
-    site: NightSite, air: TrueAir, law: SteelExpansion | None, plan: Mapping[str, list[ScheduledShot]]
-) -> MovingPoints:
-    """Points of the expanding telescope.
+def _moving(site: NightSite, air: TrueAir, nature: Nature, plan: Mapping[str, list[ScheduledShot]]) -> MovingPoints:
+    """Points of the telescope as it expands and moves.
 
     The drawn positions hold half-way from the first shot to the last.
+
+    Raises InputError: a movement of an unknown body.
     """
+    law = nature.expansion
     seconds = [shot.seconds for shots in plan.values() for shot in shots]
     expansion = dict.fromkeys(site.telescope.targets, 0.0)
     on_dish = [t.name for t in (*site.telescope.dish, *(t for unit in site.telescope.triplets for t in unit.targets))]
@@ -227,6 +267,11 @@ def _moving(
         expansion |= dict.fromkeys(on_dish, law.dish_share) | dict.fromkeys(on_arm, law.arm_share)
     centre, on_alidade = np.array([*APERTURE_CENTRE, height_above_vertex(APERTURE_CENTRE)]), frozenset(on_dish + on_arm)
     middle = 0.5 * (min(seconds) + max(seconds))
+    bodies = {ARM: frozenset(on_arm), DISH: frozenset(on_dish), TELESCOPE: frozenset(site.telescope.targets)}
+    bodies[ALIDADE] = bodies[TELESCOPE] - bodies[ARM] - bodies[DISH]
+    for movement in nature.movements:
+        if movement.body not in (*bodies, *site.points):
+            raise InputError(f"a movement of {movement.body!r}: expected {', '.join(BODIES)} or a point's name")
     return MovingPoints(
         points=site.points,
         air=air,
@@ -235,6 +280,8 @@ def _moving(
         own=expansion,
         dish_middle=site.pose.dish(centre),
         carried=on_alidade,
+        movements=nature.movements,
+        bodies=bodies,
     )
 
 

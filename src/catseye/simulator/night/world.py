@@ -38,7 +38,7 @@ class TrueHead:
 class TrueMonument:
     """Ground monument: printed survey, true fixed point and scan point.
 
-    m, ground frame.
+    m, ground frame. The sheet's latitude and height above the sea are those of `levelled_mm`, or of the survey.
     """
 
     ranger: str
@@ -48,6 +48,7 @@ class TrueMonument:
     alpha_rad: np.ndarray
     true_fixed_point: np.ndarray
     true_scan_point: np.ndarray
+    levelled_mm: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ converter is written.
 
 The methods named after ZY commands (`aba` to `cwt`) do the work of those commands for one axis. Times are simulated:
 nothing sleeps. Source: [CREAGER02], the pages of the commands; [TEXAS13] for the chip.
+
+Source: [PARKER04] section 6.4.3.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Tuning an axis: identified plant, filter integers, margins, step response.
+"""Tuning an axis: plant, filter integers, margins, step response.
 
 Beyond friction the axis is gain/(s (s + decay)) from converter steps to counts. Sampled with the converter holding its
 word, and the word one sample late, this has an exact discrete form; so has the filter. The two zeros of the filter are
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from catseye.constants import DEGREE, TWO_PI
-from catseye.errors import EstimationError, ValidityError
+from catseye.errors import ValidityError
 from catseye.ranger.motion_units import LARGEST_GAIN, LIMITS, SAMPLE_TIME, checked
-from catseye.simulator.servo.axis import AxisTrace, ServoAxis
+from catseye.simulator.servo.axis import ServoAxis
 from catseye.simulator.servo.motion_chip import MotionChip
 from catseye.simulator.servo.motor import AxisDesign, Motor
 
@@ -33,12 +33,14 @@ class Plant:
     decay      1/s, of the speed without drive: damping over inertia
     friction   converter steps, dry friction of the moving axis
     sample     s
+    late       s, of the drive beyond one sample; below 0 within its uncertainty
     """
 
     gain: float
     decay: float
     friction: float = 0.0
     sample: float = SAMPLE_TIME
+    late: float = 0.0
 
     def __post_init__(self) -> None:
         if not (self.gain > 0.0 and self.decay >= 0.0 and self.friction >= 0.0 and self.sample > 0.0):
@@ -138,45 +140,6 @@ def plant_of(design: AxisDesign, sample: float = SAMPLE_TIME) -> Plant:
     return Plant(gain, design.damping / design.inertia, design.coulomb / torque, sample)
 
 
-def identify(*traces: AxisTrace, output_bits: int = 8) -> Plant:
-    """Identify gain, decay and friction from recorded moves by least squares.
-
-    Over the samples in which the axis moved.
-
-    traces        of moves that accelerate, cruise and brake; both directions for the friction's sake
-    output_bits   8 or 12, of the converter
-
-    output = (acceleration + decay speed)/gain + friction sign(speed). Speed and acceleration are those of the profile,
-    smooth as the encoder's differences are not: the mean over a move is right while the following error is small. The
-    residuals are correlated; no standard uncertainty is given. Derived here; the regression is linear.
-
-    Raises EstimationError: the moves do not separate the three, or the drive's sign is wrong.
-    """
-    rows, words = [], []
-    if not traces or min(len(trace.time) for trace in traces) < 2:
-        raise EstimationError("identify: no moves, or a trace of less than two samples")
-    for trace in traces:
-        sample = float(trace.time[1] - trace.time[0])
-        acceleration = np.gradient(trace.velocity, sample)
-        moving = trace.velocity != 0.0
-        rows.append(np.stack([acceleration, trace.velocity, np.sign(trace.velocity)], axis=1)[moving])
-        words.append(trace.output[moving] / 2.0 ** (output_bits - 8))
-    design = np.concatenate(rows)
-    scale = np.sqrt(np.mean(design**2, axis=0)) if len(design) else np.zeros(3)
-    if not (scale > 0.0).all() or np.linalg.cond(design / scale) > 1e3:
-        raise EstimationError("the moves do not separate inertia, damping and friction: accelerate, cruise and brake")
-    per_acceleration, per_speed, friction = (
-        np.linalg.lstsq(design / scale, np.concatenate(words), rcond=None)[0] / scale
-    )
-    if per_acceleration <= 0.0:
-        raise EstimationError(
-            "the drive works against the acceleration: encoder or motor leads are swapped, or no move"
-        )
-    return Plant(
-        float(1.0 / per_acceleration), max(0.0, float(per_speed / per_acceleration)), max(0.0, float(friction)), sample
-    )
-
-
 def plant_response(plant: Plant, frequency: ArrayLike) -> NDArray[np.complex128]:
     """Counts a converter step at a frequency: axis, hold and delay.
 
@@ -185,9 +148,10 @@ def plant_response(plant: Plant, frequency: ArrayLike) -> NDArray[np.complex128]
 
     Source: [FRANKLIN98], zero-order hold equivalent of K/(s (s + d)), here times 1/z.
     """
-    z = np.exp(1j * np.asarray(frequency, dtype=float) * plant.sample)
+    angular = np.asarray(frequency, dtype=float)
+    z = np.exp(1j * angular * plant.sample)
     (b1, b0), pole = _sampled_plant(plant)
-    return (b1 * z + b0) / ((z - 1.0) * (z - pole)) / z
+    return (b1 * z + b0) / ((z - 1.0) * (z - pole)) / z * np.exp(-1j * angular * plant.late)
 
 
 def filter_response(filter_: Filter, frequency: ArrayLike, sample: float = SAMPLE_TIME) -> NDArray[np.complex128]:
@@ -226,6 +190,22 @@ def margins(plant: Plant, filter_: Filter) -> Margins:
         gain=float(1.0 / size[higher[0]]) if len(higher) else float("inf"),
         gain_below=float(1.0 / size[lower[-1]]) if len(lower) else 0.0,
     )
+
+
+def bandwidth(plant: Plant, filter_: Filter) -> float:
+    """Frequency, rad/s, above which the closed loop follows with less than half of the power.
+
+    plant     the axis
+    filter_   its integers
+
+    Raises ValidityError: the loop follows at no frequency.
+    """
+    frequency = np.geomspace(1e-2, pi / plant.sample / (filter_.interval + 1), 60_001)[:-1]
+    loop = plant_response(plant, frequency) * filter_response(filter_, frequency, plant.sample)
+    follows = np.flatnonzero(np.abs(loop / (1.0 + loop)) >= 0.5**0.5)
+    if not len(follows):
+        raise ValidityError(f"the loop with kp {filter_.kp}, ki {filter_.ki}, kd {filter_.kd} follows nothing")
+    return float(frequency[follows[-1]])
 
 
 def design_filter(
@@ -286,8 +266,10 @@ def closed_loop(plant: Plant, filter_: Filter) -> tuple[NDArray[np.float64], NDA
     plant     the axis
     filter_   its integers
 
-    Raises ValidityError: a derivative less often, which has no such form.
+    Raises ValidityError: a derivative less often or a drive later than a sample, which have no such form.
     """
+    if plant.late:
+        raise ValidityError(f"drive late by {plant.late:g} s: the closed form holds for one sample of delay")
     if filter_.interval:
         raise ValidityError(f"interval {filter_.interval}: the closed form holds for a derivative every sample (0)")
     b, pole = _sampled_plant(plant)

@@ -1,5 +1,6 @@
 """Returned phasors of a living site's rangers, from beam to retroreflector."""
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -24,6 +25,9 @@ Complex = NDArray[np.complex128]
 FARTHEST = 200.0  # m: a beam that sweeps by more than `SWEEP` there is checked three times
 SWEEP = 0.1  # m
 MOST_PATHS = 1024  # paths with cached noise: a full dish has 40 000, of 12 kB each
+
+
+LAYERS = 12  # terms of a series that falls by the square of their number
 
 
 class Meeting(NamedTuple):
@@ -134,21 +138,43 @@ class Returns:
         wrong = self._faults.active("wrong-target", ranger, name, at=at)
         length = beam.path + met.along + (0.0 if wrong is None else wrong.size)
         phase = -self.radians_per_metre * ((index + 1e-6 * ppm) * length + end_index * glass)
-        return volts * np.exp(1j * (phase + self._coupled(self._scene.stations[ranger], volts, phase)))
-
-    def _coupled(self, station: TrueStation, volts: Array, phase: Array) -> Array | float:
-        """Phase coupling of a head by amplitude and phase (k,), rad.
-
-        None for the reference.
-        """
-        added: Array | float = 0.0
+        station = self._scene.stations[ranger]
+        light = volts * np.exp(1j * phase)
         if station.amplitude_to_phase:
-            added = station.amplitude_to_phase * np.log(np.maximum(volts, 1e-6) / REFERENCE_VOLT)
-        if station.cyclic.size:
-            angle = phase[:, None] * np.arange(1, station.cyclic.shape[1] + 1)
-            long = np.cos(angle) @ station.cyclic[0] + np.sin(angle) @ station.cyclic[1]
-            added = added - self.radians_per_metre * long
-        return added
+            light = light * np.exp(1j * station.amplitude_to_phase * np.log(np.maximum(volts, 1e-6) / REFERENCE_VOLT))
+        if station.cyclic.size or station.second_pass:
+            after = phase + self._cube_phase(ranger, t, state)
+            if station.cyclic.size:
+                angle = after[:, None] * np.arange(1, station.cyclic.shape[1] + 1)
+                long = np.cos(angle) @ station.cyclic[0] + np.sin(angle) @ station.cyclic[1]
+                light = light * np.exp(-1j * self.radians_per_metre * long)
+            # every pass of the light by the detector adds one that went the way once more
+            light = light / (1.0 - volts * np.conj(station.second_pass) * np.exp(1j * after))
+        return light * np.exp(1j * self._laser_turn(ranger, at)) * self._detected(ranger, at)
+
+    def _cube_phase(self, ranger: str, t: Array, state: TelescopeState) -> Array:
+        """Phase (k,), rad, by which the internal cube's return lags."""
+        station = self._scene.stations[ranger]
+        _, path = self._off_cube(station, station.zrg[None])
+        return self.radians_per_metre * self._air.index(self._scene.point(ranger, t, state), t) * path
+
+    def _laser_turn(self, ranger: str, at: float) -> float:
+        """Phase, rad, of light back into the laser: another fringe each shot."""
+        feedback = self._scene.stations[ranger].feedback
+        if not feedback:
+            return 0.0
+        fringe = self._streams(f"feedback/{ranger}/{at:.3f}").uniform(0.0, TWO_PI)
+        return feedback * math.sqrt(2.0) * math.cos(fringe)
+
+    def _detected(self, ranger: str, at: float) -> complex:
+        """Signal of a shot's image over that of an image in the mean place, where the cube's is."""
+        station = self._scene.stations[ranger]
+        place, scatter = station.image
+        if not scatter:
+            return 1.0
+        aside, across = self._streams(f"image/{ranger}/{at:.3f}").normal(scale=scatter, size=2)
+        away = math.hypot(place + aside, across)
+        return reaching(station.lag, away) / reaching(station.lag, place) if away <= 1.0 else 0.0
 
     def _off_cube(self, station: TrueStation, counts: Array) -> tuple[Array, Array]:
         """Beam offset from the internal cube (k,), m, and path to it (k,), m."""
@@ -172,3 +198,18 @@ class Returns:
         """Noise of a path and its usual amplitude between limits, reproducibly."""
         noise = path_waves(ranger, name, index_ppm=self._index_ppm, streams=self._streams, planted=self._planted)
         return noise, float(self._streams(f"path/{ranger}/{name}").uniform())
+
+
+def reaching(lag: float, away: float) -> complex:
+    """Current through a resistive disc with capacitance that reaches its rim, against that put in at the centre.
+
+    lag    rad, of the centre's, if small
+    away   place over the radius, 0 to 1
+
+    u'' + u'/r = 4 i lag u, in powers of r^2, which the reduction takes to the first.
+    """
+    term, total = 1.0 + 0.0j, 1.0 + 0.0j
+    for k in range(1, LAYERS):
+        term *= 1j * lag * away**2 / k**2
+        total += term
+    return total

@@ -6,6 +6,7 @@ without the lines received meanwhile. A disconnected one continues without its c
 
 import asyncio
 import logging
+import os
 import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -94,7 +95,7 @@ class TwinSite:
         A port that is not available, or a folder that cannot be written.
         """
         if self._folder is None:
-            self._temporary = tempfile.TemporaryDirectory(prefix="catseye-twin-")
+            self._temporary = tempfile.TemporaryDirectory(prefix=f"catseye-{os.getpid()}-")
             self._folder = Path(self._temporary.name)
         clock = asyncio.get_running_loop().time
         commands, valid = SiteCommands(self.site), set[str]()

@@ -53,6 +53,10 @@ class TrueStation:
     d0, leakage     m, V
     zrg             (2,) counts towards the internal cube
     amplitude_to_phase   rad a factor e above the reference's amplitude
+    second_pass     1/V, share of light that the detector sends out again, for each volt of return, turned by its path
+    feedback        rad, of one shot's phase by light back into the laser
+    image           of a shot on the detector, over the disc's radius: mean place, and scatter of each coordinate
+    lag             rad, of the disc's centre behind its rim
     cyclic          (2, n) m of range error: cosines and sines, orders of the phase after the electronics'
     sinks, sways, leans   (3,) m/s; (3,) m; (3,) rad: how the monument settles
     """
@@ -71,6 +75,10 @@ class TrueStation:
     leakage: complex
     zrg: Array
     amplitude_to_phase: float
+    second_pass: complex
+    feedback: float
+    image: tuple[float, float]
+    lag: float
     cyclic: Array
     sinks: Array
     sways: Array
@@ -224,7 +232,11 @@ def _station(
         leakage=planted.gain("leakage") * leakage,
         zrg=np.array([mirror.azm_zrg, mirror.elv_zrg], dtype=float),
         amplitude_to_phase=float(true(mirror.amplitude_to_phase_rad, mirror.u_amplitude_to_phase_rad)),
+        feedback=mirror.u_feedback_rad or 0.0,
+        image=_image(mirror),
+        lag=mirror.detector_lag_rad,
         cyclic=true(_cyclic(mirror), mirror.u_cyclic_mm, MILLIMETRE),
+        second_pass=complex(*true(_second_pass(mirror), mirror.u_second_pass_per_volt)),
         sinks=sinks,
         sways=sways,
         leans=leans,
@@ -251,6 +263,21 @@ def _cyclic(mirror: Mirror) -> Array:
     if mirror.cyclic_cosine_mm:
         waves[:] = mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm
     return waves
+
+
+def _second_pass(mirror: Mirror) -> tuple[float, ...]:
+    """Real and imaginary part, 1/V, of the second pass; nothing where the sheet has no uncertainty of it."""
+    if mirror.u_second_pass_per_volt is None:
+        return ()
+    return -mirror.second_pass_sine_per_volt, mirror.second_pass_cosine_per_volt
+
+
+def _image(mirror: Mirror) -> tuple[float, float]:
+    """Mean place and scatter of images, over the disc's radius; nothing where the sheet has no detector."""
+    if mirror.u_image_um is None or mirror.detector_radius_mm is None:
+        return 0.0, 0.0
+    radius = mirror.detector_radius_mm * 1e3
+    return mirror.image_offset_um / radius, mirror.u_image_um / radius
 
 
 def arm_mount(ranger: FeedArmRanger, site: SiteFolder) -> Array:

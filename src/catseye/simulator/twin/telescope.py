@@ -17,8 +17,9 @@ from catseye.aliases import Array
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.records.site.folder import SiteFolder
 from catseye.simulator.night.faults import Planted, Streams
+from catseye.simulator.structure.bent_telescope import BentTelescope
 from catseye.simulator.twin.air import LivingAir
-from catseye.simulator.twin.motion import AxisAngles, AxisMotion
+from catseye.simulator.twin.motion import HIGHEST_DEG, LOWEST_DEG, AxisAngles, AxisMotion
 from catseye.simulator.twin.waves import Waves, band, joined
 
 ARM_FOOT, ARM_LENGTH = np.array([0.0, -8.0, 10.0]), 55.0  # m, reflector frame; chosen, as `simulator.night.posture`
@@ -94,6 +95,7 @@ class Telescope:
     tilt             (2, 3) rad: lean of the bearing to east and north, constant, cosine and sine of twice the azimuth
     encoder          (2, 2, 3) rad: cosines and sines of both encoders' errors by `ENCODER_ORDERS`
     expansion        (2,) a °C of the steel: the full telescope, and the additional expansion of the dish
+    bent             structural model in place of gravity's and the steel's rigid motions; None: these are drawn
     """
 
     motion: AxisMotion
@@ -113,6 +115,7 @@ class Telescope:
     tilt: Array
     encoder: Array
     expansion: Array
+    bent: BentTelescope | None = None
 
     def angles(self, seconds: Array) -> AxisAngles:
         """True angles of the axes at times (k,)."""
@@ -157,6 +160,10 @@ class Telescope:
             "dish": Body(dish, dish_shift),
             "arm": Body(dish @ bend, arm_shift),
         }
+        if self.bent is not None:
+            for name in ("alidade", "dish", "arm"):
+                moved, (turn, shift) = self.bent.shift(name, a, e), bodies[name]
+                bodies[name] = Body(moved.turn @ turn, _moved(moved.turn, shift) + moved.shift)
         scale = steel * self.expansion
         return TelescopeState(bodies, bent[:, 3:] + warm[:, 4:], scale[:, 0], scale[:, 1])
 
@@ -171,7 +178,13 @@ class Telescope:
 def telescope(
     site: SiteFolder, motion: AxisMotion, start_mjd: float, *, air: LivingAir, streams: Streams, planted: Planted
 ) -> Telescope:
-    """Draw the telescope of a site."""
+    """Draw the telescope of a site; a structural model of the site bends it.
+
+    Raises InputError for a model that does not hold in all postures.
+    """
+    bent = None if site.structure is None else BentTelescope(site.structure)
+    if bent is not None:
+        bent.refuse_narrow(LOWEST_DEG, HIGHEST_DEG)
     residual = np.clip(streams("living posture").normal(size=(4, 3)), -2.0, 2.0)
     rigid, arm = planted.gain("posture"), planted.gain("feed_arm")
     turn = residual[1] * np.array([18.0, 8.0, 8.0]) * ARCSECOND
@@ -180,6 +193,8 @@ def telescope(
     bending[:, 3:] *= GRAVITY_DISH / np.sqrt(6.0)
     steel *= np.array([0.0, *[STEEL_SHIFT] * 3, *[STEEL_DISH / np.sqrt(6.0)] * 6])
     steel[0] = STEEL_RISE
+    if bent is not None:
+        bending[:, :3], steel[:4] = 0.0, 0.0
     nominal = site.site.frames.reflector
     conditions, dish = air.conditions, float(streams("dish expansion").uniform(-1.0, 1.0))
     return Telescope(
@@ -194,7 +209,7 @@ def telescope(
         rigid_turn=turning(rigid * turn),
         arm=arm * np.concatenate([residual[2] * 4.0 * MILLIMETRE, residual[3] * 12.0 * ARCSECOND]),
         gravity=planted.gain("gravity") * bending,
-        sag=planted.gain("gravity") * GRAVITY_SAG,
+        sag=0.0 if bent is not None else planted.gain("gravity") * GRAVITY_SAG,
         steel=planted.gain("thermal") * steel,
         sway=_sway(air.conditions.wind_m_s, streams, planted),
         tilt=planted.gain("bearing_tilt") * TILT * streams("bearing").normal(size=(2, 3)) * (1.0, 0.4, 0.4),
@@ -202,6 +217,7 @@ def telescope(
         expansion=planted.gain("expansion")
         * conditions.expansion_per_k
         * np.array([1.0, conditions.dish_expansion * dish]),
+        bent=bent,
     )
 
 

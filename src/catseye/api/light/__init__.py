@@ -1,0 +1,1 @@
+"""`import catseye`: stray light of a range."""

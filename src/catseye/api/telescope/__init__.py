@@ -1,0 +1,1 @@
+"""`import catseye`: the structural model, frames, moving rangers."""
