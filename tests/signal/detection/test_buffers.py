@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.signal.detection.buffers import BufferStatus, has_long_run, inspect_buffers, shortest_run, status_of
+from catseye.signal.detection.buffers import BufferStatus, has_long_run, inspect_buffers, shortest_run
 from catseye.signal.detection.phase import detect
 
 VOLTS = 10 / 32768
@@ -98,12 +98,6 @@ def test_a_table_is_a_lot_too():
     assert inspect_buffers(table[:, :-3], 64).status.tolist() == [BufferStatus.WRONG_LENGTH] * 3
     assert inspect_buffers(table[:0], 64).status.tolist() == []
     assert inspect_buffers([], 64).status.tolist() == []
-
-
-def test_earlier_detections_get_a_status():
-    table = np.stack([shot(), shot(4 * USUAL)])
-    assert status_of(detect(table, 64, VOLTS)).tolist() == [BufferStatus.GOOD, BufferStatus.CLIPPED]
-    assert status_of(detect(table[0], 64, VOLTS), weakest=5.0) == BufferStatus.WEAK
 
 
 @pytest.mark.parametrize(("n", "run"), [(3, 8), (16, 9), (64, 33), (200, 101)])

@@ -1,4 +1,4 @@
-"""Crossings against the crossings' own equations, scatter, two channels; and what the study of estimators concludes."""
+"""Crossings against the crossings' own equations, scatter; and what the study of estimators concludes."""
 
 import importlib.util
 import sys
@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from catseye.errors import ValidityError
-from catseye.signal.detection.zero_crossing import crossing_phase, phase_between
+from catseye.signal.detection.zero_crossing import crossing_phase
 from repository import ROOT
 
 STUDY = ROOT / "studies" / "phase_estimators.py"
@@ -89,16 +89,6 @@ def test_white_noise_is_seen_by_two_samples_an_edge():
     assert scatter == pytest.approx(noise / np.sqrt(3 * m), rel=0.05)
 
 
-def test_two_channels_measure_the_lag_at_any_frequency():
-    for period in (61.7, 200.0, 33.3):
-        t = np.arange(4000) / period
-        found = phase_between(2.0 + 3 * np.cos(2 * np.pi * t - 2.5), np.cos(2 * np.pi * t - 0.7))
-        # lines between samples: 0.016 (2 pi/33)^3 each
-        assert float(turned(found.phase, 1.8)) == pytest.approx(0.0, abs=3e-4)
-        locked = crossing_phase(3 * np.cos(2 * np.pi * t[: 20 * 64] - 2.5), 64)
-        assert abs(float(turned(locked.phase, 2.5))) > 0.01  # the wrong period does not do
-
-
 def test_a_batch_is_its_buffers_and_bad_ones_are_nan():
     rng = np.random.default_rng(9)
     waves = np.cos(2 * np.pi * np.arange(64 * 128) / 64 - rng.uniform(0, 6, (3, 40, 1))) + rng.normal(
@@ -112,7 +102,6 @@ def test_a_batch_is_its_buffers_and_bad_ones_are_nan():
     assert sorted(zip(*np.nonzero(bad), strict=True)) == [(0, 0), (1, 5), (2, 0)]
     for index in ((0, 1), (1, 4), (2, 39)):
         assert float(crossing_phase(waves[index], 64).phase) == pytest.approx(float(together.phase[index]), abs=1e-14)
-    assert np.isnan(phase_between(waves[1, 4], np.zeros(64 * 128)).phase)
     codes = np.round(1000 * waves[1, 4]).astype(np.int16)
     assert float(crossing_phase(codes, 64).phase) == pytest.approx(float(together.phase[1, 4]), abs=1e-3)
     assert crossing_phase(waves[:, :0], 64).phase.shape == (3, 0)
@@ -126,7 +115,6 @@ def test_a_batch_is_its_buffers_and_bad_ones_are_nan():
         (lambda: crossing_phase(np.zeros(0), 64), "a buffer of 0 samples"),
         (lambda: crossing_phase(np.zeros(64, dtype=complex), 64), "samples of type complex128"),
         (lambda: crossing_phase(np.zeros(64), 64, hysteresis=-1.0), "hysteresis -1.0 is not 0 or more"),
-        (lambda: phase_between(np.zeros(64), np.zeros(65)), "shapes (64,) and (65,)"),
     ],
 )
 def test_samples_without_crossings_are_refused(call, text):

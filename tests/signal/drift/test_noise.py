@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ValidityError
-from catseye.signal.drift.allan import allan_deviation, expected_variance, spur_variance
+from catseye.signal.drift.allan import allan_deviation, expected_variance
 from catseye.signal.drift.noise import noise_spectrum
 from draws import draws
 
@@ -92,7 +92,8 @@ def test_spectrum_and_allan_deviation_agree():
     spectrum, sizes = noise_spectrum(y, 1e-3), np.array([1, 8, 64, 512])
     spur = spectrum.spurs[0]
     expected = expected_variance(sizes, white=spectrum.white, flicker=spectrum.flicker, walk=spectrum.walk)
-    expected = expected + spur_variance(sizes, amplitude=spur.amplitude, cycles_per_reading=spur.frequency_hz * 1e-3)
+    turn = np.pi * spur.frequency_hz * 1e-3
+    expected = expected + (spur.amplitude * np.sin(sizes * turn) ** 2 / (sizes * np.sin(turn))) ** 2
     seen = allan_deviation(y, sizes)
     allowed = 4.0 * np.sqrt(2.0 / seen.degrees) * expected  # of one series; that of the spectrum is as large at most
     assert np.all(np.abs(seen.deviation**2 - expected) < allowed)

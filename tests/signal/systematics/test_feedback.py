@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from catseye.errors import ValidityError
@@ -11,7 +10,6 @@ from catseye.signal.systematics.feedback import (
     dephasing,
     feedback_fringe,
     feedback_parameter,
-    fringe_average,
     fringe_contrast,
     fringe_uncertainty,
     interference_phase,
@@ -63,13 +61,6 @@ def test_contrast_is_that_of_two_fields():
     assert float(fringe_contrast(1e-4, 0.5)) == pytest.approx(0.01)
 
 
-@pytest.mark.parametrize("fringes", [0.0, 0.3, 1.0, 2.4, 17.5])
-def test_fringes_that_pass_in_a_shot_average(fringes):
-    start = np.linspace(0, 2 * np.pi, 64, endpoint=False)
-    means = [quad(lambda s, a=a: np.cos(a + 2 * np.pi * fringes * s), -0.5, 0.5, limit=200)[0] for a in start]
-    assert float(fringe_average(fringes)) == pytest.approx(np.sqrt(2 * np.mean(np.square(means))), abs=1e-9)
-
-
 @pytest.mark.parametrize("u_displacement", [0.0, 20e-9, 100e-9, 1e-6])
 def test_correlation_between_shots_is_that_of_draws(u_displacement):
     rng = np.random.default_rng(1)
@@ -94,7 +85,7 @@ def test_one_shot_has_arcsine_uncertainty_and_a_fixed_path_averages_nothing():
     assert float(fringe_uncertainty(1e-3)) == pytest.approx(1e-3 / np.sqrt(2))
     assert float(fringe_uncertainty(1e-3, shots=100)) == pytest.approx(1e-3 / np.sqrt(2))
     assert float(fringe_uncertainty(1e-3, shots=100, correlation=0.0)) == pytest.approx(1e-4 / np.sqrt(2))
-    assert float(fringe_uncertainty(-1e-3, averaging=0.1)) == pytest.approx(1e-4 / np.sqrt(2))
+    assert float(fringe_uncertainty(-1e-3)) == pytest.approx(1e-3 / np.sqrt(2))
 
 
 @pytest.mark.parametrize(("c", "alpha"), [(0.0, 5.0), (0.5, 3.0), (0.95, 5.0)])

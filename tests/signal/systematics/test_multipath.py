@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 from catseye.errors import ValidityError
 from catseye.signal.detection.phase import detect
-from catseye.signal.systematics.cyclic import cyclic_orders, cyclic_range
 from catseye.signal.systematics.multipath import (
-    cats_eye_cyclic,
     cats_eye_error,
     largest_share,
     multipath_error,
     returned_share_of_pass,
+    second_pass_slopes,
+    second_pass_turn,
     two_retroreflectors,
 )
 
@@ -85,18 +85,6 @@ def test_the_bound_is_met():
     assert worst == pytest.approx(np.arcsin(0.3) * WAVELENGTH / (4 * np.pi), rel=1e-8)
 
 
-@pytest.mark.parametrize("beyond", [0.0, 0.02, 0.215])
-def test_the_cats_eye_is_cyclic_in_the_phase(beyond):
-    q, orders = 0.05, 10
-    x = 2 * np.pi * np.arange(64) / 64
-    counted = -x / (2 * np.pi) * HALF  # the phase falls as the distance grows
-    exact = cats_eye_error(5 * HALF + counted + beyond, q, WAVELENGTH)
-    cosine, sine = cats_eye_cyclic(q, WAVELENGTH, orders, extra_path=beyond)
-    np.testing.assert_allclose(cyclic_range(x, cosine, sine), exact, rtol=0, atol=q**11 * 0.016)
-    _, c, s = cyclic_orders(exact, 4)
-    np.testing.assert_allclose(np.concatenate([c, s]), [*cosine[:4], *sine[:4]], rtol=0, atol=1e-15)
-
-
 def test_a_share_within_the_limit_keeps_ten_micrometres_and_ten_percent_more_does_not():
     share = float(largest_share(10e-6, WAVELENGTH))
     assert share == pytest.approx(4 * np.pi * 10e-6 / WAVELENGTH, rel=1e-6)
@@ -123,3 +111,28 @@ def test_the_detector_may_reflect_the_limit_over_the_rest_of_the_way():
 def test_bad_input_is_refused_in_one_line(call, message):
     with pytest.raises(ValidityError, match=message):
         call()
+
+
+def test_the_second_pass_of_a_head_is_a_cats_eye_whose_share_grows_with_the_return():
+    """Angle of the pass at phase 0, share a volt; the light's phase falls by 4 pi over the wavelength a metre."""
+    wavelength, share, angle = 0.2, 8e-4, 0.9
+    path, volts = np.linspace(100.0, 100.2, 41), np.linspace(0.5, 9.0, 41)
+    light = angle - 4 * np.pi * path / wavelength
+    turn, _ = second_pass_turn(light, volts, share * np.sin(angle), -share * np.cos(angle))
+    np.testing.assert_allclose(
+        turn * wavelength / (4 * np.pi), cats_eye_error(path, share * volts, wavelength), atol=1e-15, rtol=1e-9
+    )
+
+
+def test_slopes_of_the_second_pass_are_finite_differences():
+    at, step = np.array([0.7, 3.0, 4e-3, -3e-3]), np.array([1e-6, 1e-6, 1e-9, 1e-9])
+    by_phase, by_amplitude = second_pass_slopes(*at)
+    slopes = [by_phase, by_amplitude, *second_pass_turn(*at)[1]]
+    for k, slope in enumerate(slopes):
+        high, low = (second_pass_turn(*(at + sign * step[k] * (np.arange(4) == k)))[0] for sign in (1, -1))
+        assert (high - low) / (2 * step[k]) == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_second_pass_as_strong_as_the_first_is_refused():
+    with pytest.raises(ValidityError, match="the direct light is not the strongest"):
+        second_pass_turn(0.0, 10.0, 0.1, 0.0)

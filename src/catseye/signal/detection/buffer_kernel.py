@@ -1,6 +1,10 @@
 """Compiled detection of one buffer of 16-bit samples.
 
-Does the work of `phase.detect`, `buffers.has_long_run` and `running_phasor`.
+Does the work of `phase.detect` and `buffers.has_long_run`, and takes out the run of a moving target's phase.
+
+A range rate v changes the phase by -4 pi f v/c a second. Over a buffer the plain mean is that of the middle with
+sin(x)/x of the amplitude, x half the run; but the run looks like slow noise, and the leakage is constant while the
+return turns. Both effects vanish where the run is known to a few per cent, as from the telescope's drives.
 
 For programs that process each buffer on arrival: the plain forms, which are its test, take half a millisecond of array
 overhead. Import it only for continuous streams: loading takes 0.2 s, once.
@@ -103,7 +107,13 @@ def _dropped(re, im, mean_re, mean_im, moments):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _stop_rotation(re, im, n, run, leaked, still):
-    """Turn each cycle back by the phase run, as `running_phasor`."""
+    """Turn each cycle back by the phase run, below pi a cycle in size.
+
+    A phase that runs by p(j) within a cycle of phasor A exp(i theta) leaves a A exp(i theta) + b A exp(-i theta), a the
+    mean of exp(ip) and b that of exp(-ip + 4 pi i j/n). Exact for an even run.
+
+    Source: [PARKER04] eq. 5.1-5.3 for each cycle.
+    """
     m = len(re)
     direct, image = 0.0, 0j
     for j in range(n):

@@ -159,17 +159,6 @@ def inspect_buffers(
     )
 
 
-def status_of(detection: Detection, *, weakest: float = 0.0) -> NDArray[np.int8]:
-    """BufferStatus (...) of earlier detections.
-
-    STUCK needs the samples and is not tested.
-
-    detection   any shape
-    weakest     V, amplitude below which a buffer is WEAK
-    """
-    return _judged(detection, np.zeros(detection.phasor.shape, dtype=bool), weakest)
-
-
 def shortest_run(samples_per_cycle: int) -> int:
     """Shortest run of equal samples that a live signal cannot show.
 

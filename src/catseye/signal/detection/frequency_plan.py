@@ -1,7 +1,6 @@
 """Ranger frequencies: scale, sign and ambiguity of the phase."""
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Literal
@@ -128,42 +127,6 @@ class FrequencyPlan:
         Below zero the sense of phase is reversed. Feed it to `tone_response`.
         """
         return intermediate_hz - self.phase_sign * (oscillator_offset_hz - received_offset_hz)
-
-
-def synthetic_half_wavelength(first_hz: float, second_hz: float, group_index: float = 1.0) -> float:
-    """Half wavelength of the difference of two modulations, m: unambiguous range of phase_1 - phase_2.
-
-    first_hz, second_hz    Hz, different
-    group_index            of the path; both frequencies share it, for it belongs to the light
-
-    >>> round(synthetic_half_wavelength(1500e6, 1400e6), 6)
-    1.498962
-    """
-    if first_hz == second_hz:
-        raise ValidityError(f"two modulations of the same {first_hz} Hz have no beat; give two frequencies")
-    return SPEED_OF_LIGHT / (2.0 * group_index * abs(first_hz - second_hz))
-
-
-def unambiguous_range(modulations_hz: Iterable[int], group_index: float = 1.0) -> float:
-    """Range after which exact phases at all modulations repeat, m.
-
-    It is half a wavelength of their common divisor.
-
-    modulations_hz    whole Hz, one or more
-    group_index       of the path
-
-    Noise allows less: it must also separate the candidates within.
-
-    >>> round(unambiguous_range([1_500_000_000, 1_400_000_000]), 6), round(unambiguous_range([1_500_000_000]), 6)
-    (1.498962, 0.099931)
-    """
-    frequencies = list(modulations_hz)
-    for f in frequencies:
-        if f != int(f) or f < 1:
-            raise ValidityError(f"modulation {f} Hz is not a whole number of hertz above 0")
-    if not frequencies:
-        raise ValidityError("no modulation given; at least one is needed")
-    return SPEED_OF_LIGHT / (2.0 * group_index * math.gcd(*(int(f) for f in frequencies)))
 
 
 def whole_number(what: str, value: object, *, at_least: int) -> int:

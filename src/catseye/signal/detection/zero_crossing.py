@@ -68,48 +68,6 @@ def crossing_phase(
     >>> [round(float(x), 3) for x in (crossing.rising, crossing.falling, crossing.phase, crossing.duty)]
     [1.891, 2.109, 2.0, 0.535]
     """
-    array = _real(samples, hysteresis)
-    n = samples_per_cycle
-    if n != int(n) or n < 3:
-        raise ValidityError(f"{n} samples a cycle do not determine a phase; at least 3 do")
-    if array.shape[-1] == 0 or array.shape[-1] % int(n):
-        raise ValidityError(f"a buffer of {array.shape[-1]} samples is not a whole number of cycles of {n} samples")
-    buffers = array.reshape(-1, array.shape[-1])
-    edges = _edge_phases(buffers, np.full(len(buffers), float(n)), level, hysteresis)
-    return _crossing(*edges, array.shape[:-1])
-
-
-def phase_between(samples: ArrayLike, reference: ArrayLike, *, hysteresis: float = 0.0) -> Crossing:
-    """Phase lag behind a reference of the same unknown frequency.
-
-    It uses the crossings of both.
-
-    samples       (..., k) V or codes
-    reference     (..., k) the other channel, taken at the same times, clean: one rising edge a cycle, at least two
-    hysteresis    0 or more, in the unit of the samples, of both comparators
-
-    The period is the mean of the reference's. Both channels cross their own mean. The buffer need not hold whole
-    cycles; the means are then slightly biased, which the average of both edges cancels. NaN without a period.
-
-    Raises ValidityError for shapes that do not agree. Source: [PARKER04] section 5.2, first paragraph.
-
-    >>> t = np.arange(1000) / 61.7
-    >>> crossing = phase_between(3 * np.cos(2 * np.pi * t - 2.5), np.cos(2 * np.pi * t - 0.5))
-    >>> round(float(crossing.phase), 3)
-    2.0
-    """
-    signal, clean = _real(samples, hysteresis), _real(reference, hysteresis)
-    if signal.shape != clean.shape:
-        raise ValidityError(f"signal and reference have shapes {signal.shape} and {clean.shape}; expected the same")
-    length = signal.shape[-1]
-    signals, references = signal.reshape(-1, length), clean.reshape(-1, length)
-    period = _periods(references, hysteresis)
-    rising, falling, edges = _edge_phases(signals, period, None, hysteresis)
-    rising_0, falling_0, _ = _edge_phases(references, period, None, hysteresis)
-    return _crossing(rising - rising_0, falling - falling_0, edges, signal.shape[:-1])
-
-
-def _real(samples: ArrayLike, hysteresis: float) -> NDArray[np.float64]:
     array = np.asarray(samples)
     if array.dtype.kind not in "iuf" or array.ndim == 0:
         raise ValidityError(
@@ -117,17 +75,14 @@ def _real(samples: ArrayLike, hysteresis: float) -> NDArray[np.float64]:
         )
     if not 0.0 <= hysteresis < np.inf:
         raise ValidityError(f"hysteresis {hysteresis} is not 0 or more and finite")
-    return array.astype(float, copy=False)
-
-
-def _crossing(
-    rising: NDArray[np.float64], falling: NDArray[np.float64], edges: NDArray[np.int64], shape: tuple[int, ...]
-) -> Crossing:
-    """Crossing from the phases of both edges.
-
-    Their difference gives the duty cycle.
-    """
-    apart = np.angle(np.exp(1j * (falling - rising)))
+    n = samples_per_cycle
+    if n != int(n) or n < 3:
+        raise ValidityError(f"{n} samples a cycle do not determine a phase; at least 3 do")
+    if array.shape[-1] == 0 or array.shape[-1] % int(n):
+        raise ValidityError(f"a buffer of {array.shape[-1]} samples is not a whole number of cycles of {n} samples")
+    buffers, shape = array.astype(float, copy=False).reshape(-1, array.shape[-1]), array.shape[:-1]
+    rising, falling, edges = _edge_phases(buffers, float(n), level, hysteresis)
+    apart = np.angle(np.exp(1j * (falling - rising)))  # gives the duty cycle
     return Crossing(
         phase=fraction(rising + 0.5 * apart, 0.0).reshape(shape),
         rising=fraction(rising, 0.0).reshape(shape),
@@ -138,9 +93,9 @@ def _crossing(
 
 
 def _edge_phases(
-    buffers: NDArray[np.float64], period: NDArray[np.float64], level: float | None, hysteresis: float
+    buffers: NDArray[np.float64], period: float, level: float | None, hysteresis: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Phases from rising and falling edges, and their numbers (count, 2); `period` (count,) in samples.
+    """Phases from rising and falling edges, and their numbers (count, 2); `period` in samples.
 
     cos(2 pi t - phi) rises through zero at 2 pi t = phi - pi/2 and falls at phi + pi/2.
     """
@@ -152,11 +107,11 @@ def _edge_phases(
         block = buffers[rows]
         with np.errstate(invalid="ignore"):
             height = block - (block.mean(axis=-1, keepdims=True) if level is None else level)
-        usable = np.isfinite(height).all(axis=-1) & np.isfinite(period[rows])
+        usable = np.isfinite(height).all(axis=-1)
         height[~usable] = 0.0
         for k, sense in enumerate((1.0, -1.0)):
             row, time = _edges(sense * height, hysteresis)
-            turned = np.exp(1j * (TWO_PI * time / np.where(usable, period[rows], 1.0)[row] + sense * np.pi / 2.0))
+            turned = np.exp(1j * (TWO_PI * time / period + sense * np.pi / 2.0))
             size = len(block)
             sums = np.bincount(row, turned.real, size) + 1j * np.bincount(row, turned.imag, size)
             number = np.bincount(row, minlength=size)
@@ -175,17 +130,3 @@ def _edges(height: NDArray[np.float64], hysteresis: float) -> tuple[NDArray[np.i
     row, before = np.nonzero((state[:, :-1] < 0) & (state[:, 1:] > 0))
     low, high = height[row, before], height[row, before + 1]
     return row, before + (hysteresis - low) / (high - low)
-
-
-def _periods(references: NDArray[np.float64], hysteresis: float) -> NDArray[np.float64]:
-    """Mean period of each reference, samples; NaN without two edges.
-
-    First to last rising edge.
-    """
-    period = np.full(len(references), np.nan)
-    for i, wave in enumerate(references):
-        if np.isfinite(wave).all():
-            _, time = _edges((wave - wave.mean())[None], hysteresis)
-            if len(time) > 1:
-                period[i] = (time[-1] - time[0]) / (len(time) - 1)
-    return period

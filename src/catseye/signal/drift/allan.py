@@ -117,24 +117,6 @@ def _flicker_variance(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
     return variance
 
 
-def spur_variance(size: ArrayLike, *, amplitude: float, cycles_per_reading: float) -> NDArray:
-    """Allan variance of averages of m readings for a sine.
-
-    size                 m, readings averaged
-    amplitude            of the sine, unit of the series
-    cycles_per_reading   its frequency times the interval, 0 to 0.5
-
-    Source: [RILEY08] 6.2 has A^2 sin^4(x)/x^2 with x = pi f m tau; here the readings are points, not averages
-    themselves, so that x becomes m sin(pi f tau). Exact for a long series.
-
-    >>> round(float(spur_variance(1, amplitude=1.0, cycles_per_reading=0.5)), 6)
-    1.0
-    """
-    turn = np.pi * cycles_per_reading
-    m = np.asarray(size, dtype=float)
-    return (amplitude * np.sin(m * turn) ** 2 / (m * np.sin(turn))) ** 2
-
-
 def _variance(sums: NDArray[np.float64], m: int) -> float:
     second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
     return float(np.mean(second**2) / (2.0 * m**2))

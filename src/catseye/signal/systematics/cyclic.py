@@ -1,4 +1,4 @@
-"""Cyclic deviation of a range: causes and estimation.
+"""Cyclic deviation of a range: causes, and orders that phases can separate.
 
 x is the phase after the electronics', in radians, as measured. It falls by 2 pi for each half wavelength of distance.
 A phase read too high by d is a range read too long by -d wavelength/(4 pi).
@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.aliases import Array
 from catseye.constants import TWO_PI
-from catseye.errors import EstimationError, ValidityError
-from catseye.signal.systematics.columns import LinearFit, fit_columns
+from catseye.errors import ValidityError
 
+WORST_CONDITION = 1e8  # of columns scaled to unit length: beyond it half of the digits are lost
 WORST_INFLATION = 5.0  # of a coefficient's standard uncertainty over that of evenly spread phases
 
 
@@ -165,13 +165,13 @@ class Separability:
 
 
 def separable_orders(
-    phase_fraction: ArrayLike, orders: int, *, others: ArrayLike | None = None, worst: float = WORST_INFLATION
+    phase_fraction: ArrayLike, orders: int, *, nuisance: ArrayLike | None = None, worst: float = WORST_INFLATION
 ) -> Separability:
     """Orders separable from each other and from nuisance columns.
 
     phase_fraction   (n,) rad
     orders           K, the highest order requested
-    others           (n, q) columns estimated as well: by default one, the constant
+    nuisance         (n, q) columns estimated as well: by default one, the constant
     worst            inflation of any coefficient's standard uncertainty beyond which an order is left out
 
     Orders are added until any coefficient goes beyond `worst`; none is retained above an excluded one, which would be
@@ -184,15 +184,14 @@ def separable_orders(
     (1, 2)
     """
     x = np.asarray(phase_fraction, dtype=float)
-    further = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
+    further = np.ones((len(x), 1)) if nuisance is None else np.asarray(nuisance, dtype=float)
     retained: tuple[int, ...] = ()
     inflation = np.full(len(_orders(orders)), np.inf)
     for order in range(1, orders + 1):
         trial = (*retained, order)
         design = np.concatenate([cyclic_design(x, trial), further], axis=1)
-        try:
-            u = fit_columns(design, np.zeros(len(x)), np.sqrt(len(x) / 2.0)).u
-        except EstimationError:
+        u = _inflation(design)
+        if u is None:
             break
         k = len(trial)
         inflation[order - 1] = max(u[k - 1], u[2 * k - 1])
@@ -203,35 +202,14 @@ def separable_orders(
     return Separability(retained, inflation, float(np.linalg.cond(columns / np.linalg.norm(columns, axis=0))))
 
 
-def fit_cyclic(
-    phase_fraction: ArrayLike,
-    deviation: ArrayLike,
-    spread: ArrayLike,
-    *,
-    orders: int,
-    others: ArrayLike | None = None,
-) -> tuple[Array, Array, LinearFit]:
-    """Fit cosine and sine coefficients (K,) to a range's deviation.
-
-    Also returns the whole fit: cosines, sines, then the nuisance columns.
-
-    phase_fraction   (n,) rad, x
-    deviation        (n,) m, range less its reference value
-    spread           m, standard uncertainty, one number or (n,); or the covariance (n, n), m^2
-    orders           K
-    others           (n, q) columns estimated as well: by default one, the constant
-
-    Raises EstimationError where the phases do not separate the orders: see `separable_orders`.
-
-    >>> x = np.linspace(0.0, 6.0, 20)
-    >>> cosine, sine, fit = fit_cyclic(x, cyclic_range(x, [4e-6], [1e-6]) + 1e-4, 1e-6, orders=1)
-    >>> f"{cosine[0]:.2e} {sine[0]:.2e} {fit.coefficient[2]:.2e}"
-    '4.00e-06 1.00e-06 1.00e-04'
-    """
-    x = np.asarray(phase_fraction, dtype=float)
-    further = np.ones((len(x), 1)) if others is None else np.asarray(others, dtype=float)
-    fit = fit_columns(np.concatenate([cyclic_design(x, orders), further], axis=1), deviation, spread)
-    return fit.coefficient[:orders], fit.coefficient[orders : 2 * orders], fit
+def _inflation(design: Array) -> Array | None:
+    """Standard uncertainty of each coefficient over that of a wave at evenly spread phases; None if inseparable."""
+    length = np.linalg.norm(design, axis=0)
+    count, columns = design.shape
+    if count < columns or np.any(length == 0.0) or np.linalg.cond(design / length) > WORST_CONDITION:
+        return None
+    inverse = np.linalg.pinv(design / length) / length[:, None]
+    return np.linalg.norm(inverse, axis=1) * np.sqrt(count / 2.0)
 
 
 def _coefficients(cosine: ArrayLike, sine: ArrayLike) -> tuple[Array, Array]:

@@ -96,19 +96,6 @@ def interference_phase(contrast: ArrayLike, optical_phase: ArrayLike, modulation
     return np.angle(1.0 + 0.5 * a * np.cos(optical_phase) * (1.0 + np.exp(-1j * psi)))
 
 
-def fringe_average(fringes: ArrayLike) -> Array:
-    """Fringe amplitude left after steady motion in a shot: |sinc|.
-
-    fringes   passed in the shot: twice the change of distance over the optical wavelength
-
-    At most 1/(pi fringes); 1 at rest. Source: mean of a cosine over a window. Exact for steady motion.
-
-    >>> round(float(fringe_average(0.5)), 6)
-    0.63662
-    """
-    return np.abs(np.sinc(np.asarray(fringes, dtype=float)))
-
-
 def dephasing(u_displacement: ArrayLike, optical_wavelength: ArrayLike) -> Array:
     """Fringe correlation after random motion, 0 to 1.
 
@@ -125,17 +112,14 @@ def dephasing(u_displacement: ArrayLike, optical_wavelength: ArrayLike) -> Array
     return np.exp(-0.5 * optical_phase(u_displacement, optical_wavelength) ** 2)
 
 
-def fringe_uncertainty(
-    largest: ArrayLike, *, averaging: ArrayLike = 1.0, shots: ArrayLike = 1, correlation: ArrayLike = 1.0
-) -> Array:
+def fringe_uncertainty(largest: ArrayLike, *, shots: ArrayLike = 1, correlation: ArrayLike = 1.0) -> Array:
     """Standard uncertainty of a mean of shots with unknown fringe phase.
 
     largest       largest effect of a fringe, any unit
-    averaging     share remaining in one shot, see `fringe_average` and `dephasing`
     shots         their number
     correlation   between any two of them, 0 to 1, see `dephasing`; 1, a path at rest, averages nothing
 
-    u^2 = (largest averaging)^2/2 (1 + (n - 1) correlation)/n; for one shot the distribution is arcsine.
+    u^2 = largest^2/2 (1 + (n - 1) correlation)/n; for one shot the distribution is arcsine.
     Raises ValidityError for a correlation outside 0 to 1 or less than one shot.
 
     Source: [JCGM100] 4.3 and 5.2.2. Exact.
@@ -147,7 +131,7 @@ def fringe_uncertainty(
     _expect(n >= 1.0, n, "number of shots", "at least 1")
     _expect((r >= 0.0) & (r <= 1.0), r, "correlation between shots", "within 0 to 1")
     share = (1.0 + (n - 1.0) * r) / n
-    return np.abs(np.asarray(largest, dtype=float) * np.asarray(averaging, dtype=float)) * np.sqrt(0.5 * share)
+    return np.abs(np.asarray(largest, dtype=float)) * np.sqrt(0.5 * share)
 
 
 def feedback_parameter(

@@ -1,10 +1,8 @@
-"""Leakage phasor inside the instrument: subtraction, estimation, remaining range error.
+"""Leakage phasor inside the instrument: subtraction, centre of a circle, remaining range error.
 
 A leakage is one phasor, added to that of the light: its real and imaginary part are two parameters common to all shots
 of a ranger, reference shots included. Covariances (2, 2) are of real and imaginary part, V^2.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +13,7 @@ from catseye.errors import EstimationError, ValidityError
 
 ITERATIONS = 50  # of the circle fit; it needs three to six
 SETTLED = 1e-10  # of the radius: the last step of the circle fit
+WORST_CONDITION = 1e7  # of the circle fit: that of an arc of two milliradians
 
 Phasors = NDArray[np.complex128]
 
@@ -33,21 +32,6 @@ def subtract_leakage(phasor: ArrayLike, leakage_amplitude: ArrayLike, leakage_ph
     """
     leakage = np.asarray(leakage_amplitude, dtype=float) * np.exp(1j * np.asarray(leakage_phase, dtype=float))
     return np.asarray(phasor, dtype=complex) - leakage
-
-
-def light_covariance(u_phasor: ArrayLike, leakage_covariance: ArrayLike) -> Array:
-    """Covariance of the light's phasor, (..., 2, 2) V^2.
-
-    It combines detection and leakage.
-
-    u_phasor             (...) V, standard uncertainty of each quadrature of the detected phasor
-    leakage_covariance   (2, 2) V^2
-
-    >>> light_covariance(3.0, np.diag([16.0, 0.0])).tolist()
-    [[25.0, 0.0], [0.0, 9.0]]
-    """
-    variance = np.asarray(u_phasor, dtype=float) ** 2
-    return variance[..., None, None] * np.eye(2) + np.asarray(leakage_covariance, dtype=float)
 
 
 def polar_covariance(phasor: ArrayLike, covariance: ArrayLike) -> Array:
@@ -87,195 +71,41 @@ def phase_by_leakage(light: ArrayLike, reference: ArrayLike | None = None) -> Ar
     return slope if reference is None else slope - phase_by_leakage(reference)
 
 
-def phase_covariance(
-    light: ArrayLike, u_phasor: ArrayLike, leakage_covariance: ArrayLike, *, reference: ArrayLike | None = None
-) -> Array:
-    """Phase covariance of n shots sharing one leakage, (n, n) rad^2.
-
-    light                (n,) V, complex, after the subtraction
-    u_phasor             (n,) V or one number, standard uncertainty of each quadrature
-    leakage_covariance   (2, 2) V^2
-    reference            (n,) V, complex: if given, of the phases relative to the references'; without the references'
-                         noise (see `drift_at`)
-
-    >>> phase_covariance([1.0, 2.0], 0.0, np.diag([0.0, 4e-6])).round(12).tolist()
-    [[4e-06, 2e-06], [2e-06, 1e-06]]
-    """
-    z = np.asarray(light, dtype=complex)
-    slope = phase_by_leakage(z, reference)
-    shot_variance = np.broadcast_to((np.asarray(u_phasor, dtype=float) / np.abs(z)) ** 2, z.shape)
-    return np.diag(shot_variance) + slope @ np.asarray(leakage_covariance, dtype=float) @ slope.T
-
-
-@dataclass(frozen=True, eq=False)
-class Leakage:
-    """Estimated leakage, with covariance and residuals.
-
-    phasor               V, complex
-    covariance           (2, 2) V^2, of the estimate
-    covariance_in_use    (2, 2) V^2, of the leakage at another time: with its scatter between sessions if estimated
-    residual             V, (n,): complex, or from the circle (above 0 outside) for a circle fit
-    variance_factor      of the residuals against the given uncertainties; NaN where none were given
-    degrees_of_freedom   of the covariance
-    drift                test of slow drift within the sessions against white noise, standard normal without drift
-                         (at 3: take more sessions, or shorter ones); NaN with fewer than 4 in each
-    """
-
-    phasor: complex
-    covariance: Array
-    covariance_in_use: Array
-    residual: NDArray[np.generic]
-    variance_factor: float
-    degrees_of_freedom: int
-    drift: float = float("nan")
-
-
-def blocked_leakage(phasor: ArrayLike, session: ArrayLike | None = None) -> Leakage:
-    """Leakage from buffers with the beam blocked.
-
-    Mean of the session means, with their scatter.
-
-    phasor    (n,) V, complex, in order of time
-    session   (n,) label of each buffer's session; by default one session
-
-    With several sessions the uncertainty is their means' scatter, whatever drifts within or between them; a later
-    leakage has that scatter in addition (slightly too much: it includes the noise of a session's mean). With one
-    session it is the buffers' scatter, valid only where `drift` is insignificant, and not for other times.
-
-    Raises ValidityError for a phasor that is not finite, EstimationError for fewer than 3 sessions, or 3 buffers in one
-    session: a (2, 2) scatter needs that.
-
-    Source: [JCGM100] 4.2.3, standard uncertainty of a mean; drift by the ratio of successive differences.
-    Unbiased for sessions of any sizes.
-
-    >>> complex(np.round(blocked_leakage([0.1 + 0.2j, 0.1 + 0.4j, 0.4 + 0.3j]).phasor, 3))
-    (0.2+0.3j)
-    """
-    z = np.asarray(phasor, dtype=complex)
-    _expect_readings(z, np.ones(()))
-    labels = np.zeros(len(z), dtype=int) if session is None else np.unique(np.asarray(session), return_inverse=True)[1]
-    count = int(labels.max()) + 1 if len(z) else 0
-    means = np.array([z[labels == k].mean() for k in range(count)])
-    units = means if count > 1 else z
-    if len(units) < 3:
-        what = f"{count} sessions" if count > 1 else f"{len(z)} buffers in one session"
-        raise EstimationError(f"{what} do not determine the scatter of a leakage (expected at least 3)")
-    scatter = np.cov(np.stack([units.real, units.imag]))
-    covariance = scatter / len(units)
-    return Leakage(
-        phasor=complex(units.mean()),
-        covariance=covariance,
-        covariance_in_use=scatter + covariance if count > 1 else covariance,
-        residual=z - units.mean(),
-        variance_factor=float("nan"),
-        degrees_of_freedom=len(units) - 1,
-        drift=_drift(z, labels, count),
-    )
-
-
-def circle_leakage(phasor: ArrayLike, u_phasor: ArrayLike) -> Leakage:
-    """Leakage as the centre of a circle of phasors.
+def circle_leakage(phasor: ArrayLike) -> complex:
+    """Leakage, V, as the centre of a circle of phasors.
 
     The phasors have constant amplitude and any phase.
 
-    phasor     (n,) V, complex, of a retroreflector moved over a half wavelength or more
-    u_phasor   V, standard uncertainty of each quadrature, (n,) or one number, above 0
+    phasor     (n,) V, complex, of a retroreflector moved over a half wavelength or more, all as good
 
     The phases need not be known. An amplitude that varies with the phase by e cos(x - a) cannot be separated from a
-    leakage: the rail must be aligned. On a short arc centre and radius are correlated, as the covariance shows. It is
-    of first order; the bias is of second order (a few u^2/radius on a quarter of the circle).
+    leakage: the rail must be aligned. The bias is of second order (a few u^2/radius on a quarter of the circle).
 
-    Raises ValidityError for invalid phasors or uncertainties, EstimationError where the phasors do not form a circle.
+    Raises EstimationError where the phasors do not form a circle.
 
     Source: least squares of the distances from a circle, by Gauss and Newton from the algebraic fit of Kasa.
 
     >>> z = 0.03j + np.exp(1j * np.linspace(0.0, 5.0, 12))
-    >>> round(circle_leakage(z, 1e-3).phasor.imag, 9)
+    >>> round(circle_leakage(z).imag, 9)
     0.03
     """
-    z, u = np.asarray(phasor, dtype=complex), np.asarray(u_phasor, dtype=float)
-    _expect_readings(z, u)
+    z = np.asarray(phasor, dtype=complex)
     if len(z) < 4:
         raise EstimationError(f"{len(z)} phasors do not determine a circle (expected at least 4)")
-    u = np.broadcast_to(u, z.shape)
     point = _algebraic_circle(z)
     for _ in range(ITERATIONS):
         arm = z - complex(point[0], point[1])
         away = np.abs(arm)
         if not np.all(away > 0.0):
             break
-        design = np.stack([arm.real / away, arm.imag / away, np.ones(len(z))], axis=1) / u[:, None]
-        if np.linalg.cond(design) > 1e8:
+        design = np.stack([arm.real / away, arm.imag / away, np.ones(len(z))], axis=1)
+        if np.linalg.cond(design) > WORST_CONDITION:
             break
-        step = np.linalg.lstsq(design, (away - point[2]) / u, rcond=None)[0]
+        step = np.linalg.lstsq(design, away - point[2], rcond=None)[0]
         point = point + step
         if np.max(np.abs(step)) < SETTLED * abs(point[2]):
-            covariance = np.linalg.inv(design.T @ design)
-            if np.sqrt(np.trace(covariance[:2, :2])) > abs(point[2]):
-                break
-            residual = np.abs(z - complex(point[0], point[1])) - point[2]
-            degrees = len(z) - 3
-            factor = float(np.sum((residual / u) ** 2)) / degrees
-            centre = covariance[:2, :2]
-            return Leakage(
-                phasor=complex(point[0], point[1]),
-                covariance=centre,
-                covariance_in_use=centre,
-                residual=residual,
-                variance_factor=factor,
-                degrees_of_freedom=degrees,
-            )
+            return complex(point[0], point[1])
     raise EstimationError("the phasors do not form a circle: move the retroreflector over more of a half wavelength")
-
-
-def rail_leakage(
-    phasor: ArrayLike, phase: ArrayLike, u_phasor: ArrayLike, *, fading: ArrayLike | None = None
-) -> Leakage:
-    """Leakage from phasors on a rail measured by interferometer.
-
-    The phase is known but for a constant.
-
-    phasor     (n,) V, complex
-    phase      (n,) rad, -4 pi n_g f D/c of the retroreflector, falling with distance; the constant is free
-    u_phasor   V, standard uncertainty of each quadrature, (n,) or one number, above 0
-    fading     (n,) along which the amplitude may vary in a line (the distance, the time); by default it is constant
-
-    Solves phasor = leakage + (g + h fading) exp(i phase) for three complex numbers: linear, and unlike the circle not
-    biased by a misaligned rail. A phase with the wrong sign gives a variance factor far from 1.
-
-    Raises ValidityError for invalid phasors or uncertainties, EstimationError where the phases do not separate
-    leakage from light.
-
-    Source: complex least squares with circular noise, [FOERSTNER16] chapter 4. Exact for the model.
-
-    >>> turn = -np.linspace(0.0, 5.0, 12)
-    >>> round(rail_leakage(0.03j + 2.0 * np.exp(1j * (turn + 0.7)), turn, 1e-3).phasor.imag, 9)
-    0.03
-    """
-    z, u = np.asarray(phasor, dtype=complex), np.asarray(u_phasor, dtype=float)
-    _expect_readings(z, u)
-    u = np.broadcast_to(u, z.shape)
-    turning = np.exp(1j * np.asarray(phase, dtype=float))
-    columns = [np.ones_like(z), turning]
-    if fading is not None:
-        along = np.asarray(fading, dtype=float)
-        columns.append(turning * (along - along.mean()) / max(float(np.ptp(along)), np.finfo(float).tiny))
-    design = np.stack(columns, axis=1) / u[:, None]
-    if len(z) <= len(columns) or np.linalg.cond(design * u.mean()) > 1e6:
-        raise EstimationError(f"{len(z)} phasors do not separate leakage from light: move the retroreflector further")
-    inverse = np.linalg.pinv(design)
-    residual = z - (design * u[:, None]) @ (inverse @ (z / u))
-    covariance = float(np.sum(np.abs(inverse[0]) ** 2)) * np.eye(2)
-    degrees = 2 * (len(z) - len(columns))
-    factor = float(np.sum(np.abs(residual / u) ** 2)) / degrees
-    return Leakage(
-        phasor=complex(inverse[0] @ (z / u)),
-        covariance=covariance,
-        covariance_in_use=covariance,
-        residual=residual,
-        variance_factor=factor,
-        degrees_of_freedom=degrees,
-    )
 
 
 def quadrature_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) -> Array:
@@ -305,6 +135,8 @@ def worst_range_error(noise_to_signal: ArrayLike, wavelength: ArrayLike) -> Arra
 
     The sum is turned most where it is at right angles to the disturbance: arcsin(r), the notes' 5.7 has
     arctan(r). Raises ValidityError outside 0 to 1, where the disturbance dominates the phase.
+
+    Source: [PARKER04] eqs. 5.7 and 5.8, corrected. Exact.
 
     >>> round(float(worst_range_error(0.1, 0.2) / quadrature_range_error(0.1, 0.2)), 5)
     1.005
@@ -340,14 +172,6 @@ def _share(noise_to_signal: ArrayLike) -> Array:
     return ratio
 
 
-def _expect_readings(z: Phasors, u: Array) -> None:
-    if not np.all(np.isfinite(z)):
-        where = int(np.flatnonzero(~np.isfinite(z))[0])
-        raise ValidityError(f"phasor {where} is {z[where]} V (expected finite numbers: leave that buffer out)")
-    if not (np.all(u > 0.0) and np.all(np.isfinite(u))):
-        raise ValidityError(f"standard uncertainty {np.min(u)} V of a phasor is not above 0 and finite")
-
-
 def _algebraic_circle(z: Phasors) -> Array:
     """Centre and radius by linear least squares of |z|^2 = 2 x a + 2 y b + c, from the mean."""
     middle = z.mean()
@@ -355,18 +179,3 @@ def _algebraic_circle(z: Phasors) -> Array:
     design = np.stack([2.0 * w.real, 2.0 * w.imag, np.ones(len(w))], axis=1)
     a, b, c = np.linalg.lstsq(design, np.abs(w) ** 2, rcond=None)[0]
     return np.array([a + middle.real, b + middle.imag, np.sqrt(max(c + a**2 + b**2, 0.0))])
-
-
-def _drift(z: Phasors, labels: NDArray[np.int64], count: int) -> float:
-    """Drift test of all sessions: 1 less the von Neumann ratio, over its sigma for white circular noise."""
-    steps = squares = variance = 0.0
-    for k in range(count):
-        phasors = z[labels == k]
-        n = len(phasors)
-        if n < 4:
-            continue
-        spread = float(np.sum(np.abs(phasors - phasors.mean()) ** 2))
-        steps += 0.5 * float(np.sum(np.abs(np.diff(phasors)) ** 2))
-        squares += spread
-        variance += spread**2 * (n - 2.0) / (2.0 * (n**2 - 1.0))
-    return (squares - steps) / np.sqrt(variance) if variance > 0.0 else float("nan")

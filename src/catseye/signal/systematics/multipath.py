@@ -84,28 +84,56 @@ def cats_eye_error(path: ArrayLike, share: ArrayLike, wavelength: ArrayLike) -> 
     return np.arctan2(q * np.sin(psi), 1.0 - q * np.cos(psi)) * w / (2.0 * TWO_PI)
 
 
-def cats_eye_cyclic(share: float, wavelength: float, orders: int, *, extra_path: float = 0.0) -> tuple[Array, Array]:
-    """Cyclic coefficients (K,), cosine and sine, m, of cat's-eye error.
+def second_pass_turn(
+    phase_fraction: ArrayLike, amplitude: ArrayLike, cosine: ArrayLike, sine: ArrayLike
+) -> tuple[Array, Array]:
+    """Turn of a phasor by light sent out again by the detector, rad (...), with its derivatives (..., 2).
 
-    A wave of the light's own phase x.
+    Positive where the range is too long: times wavelength/(4 pi) it is the range error. The derivatives are those by
+    `cosine` and `sine`, rad V.
 
-    share        returned once more for each return, 0 to below 1
-    wavelength   m, the modulation's group wavelength in air
-    orders       K
-    extra_path   m, the path from detector to target less the distance that x counts: D0, plus mirror to detector
+    phase_fraction   (...) rad, x, phase after the electronics', which falls as the distance grows
+    amplitude        (...) V, of the return
+    cosine, sine     1/V, s sin(a) and -s cos(a): s the share of the second pass for each volt of return, a its angle
+                     at x = 0
 
-    With psi = 4 pi extra_path/wavelength - x. Raises ValidityError for a share outside these limits.
+    The share of the second pass grows with the return, as both meet the same target and the same air: q = s amplitude.
+    With psi = a - x it is `cats_eye_error`, to which it is equal. Raises ValidityError where the second pass is not
+    smaller than the first.
 
-    Source: Fourier series of -arg(1 - q exp(-i psi)): q^k/k sin(k psi) wavelength/(4 pi). Exact.
+    Source: [PARKER04] chapter 6, item 3, names the effect. Derived here; exact for equal shares.
 
-    >>> [f"{c:.2e}" for c in cats_eye_cyclic(0.01, 0.2, 2)[1]]
-    ['-1.59e-04', '-7.96e-07']
+    >>> turn, _ = second_pass_turn(0.0, 2.0, 0.0005, 0.0)
+    >>> f"{float(turn) * 0.2 / (4 * np.pi):.3e}"
+    '1.592e-05'
     """
-    q = float(_shares(np.array([share]))[0])
-    k = np.arange(1, orders + 1)
-    size = q**k / k * wavelength / (2.0 * TWO_PI)
-    turn = k * 2.0 * TWO_PI * extra_path / wavelength
-    return size * np.sin(turn), -size * np.cos(turn)
+    x, volts = np.asarray(phase_fraction, dtype=float), np.asarray(amplitude, dtype=float)
+    c, s = np.asarray(cosine, dtype=float), np.asarray(sine, dtype=float)
+    _shares((volts * np.hypot(c, s))[..., None])
+    across, along = volts * (c * np.cos(x) + s * np.sin(x)), volts * (c * np.sin(x) - s * np.cos(x))  # q sin, q cos psi
+    by_across, by_along = np.stack([np.cos(x), np.sin(x)], axis=-1), np.stack([np.sin(x), -np.cos(x)], axis=-1)
+    direct, square = (1.0 - along)[..., None], (1.0 - along) ** 2 + across**2
+    slopes = (volts / square)[..., None] * (direct * by_across + across[..., None] * by_along)
+    return np.arctan2(across, 1.0 - along), slopes
+
+
+def second_pass_slopes(
+    phase_fraction: ArrayLike, amplitude: ArrayLike, cosine: ArrayLike, sine: ArrayLike
+) -> tuple[Array, Array]:
+    """Derivatives of `second_pass_turn` by the phase, rad/rad, and by the amplitude, rad/V; arguments as there.
+
+    Raises ValidityError where the second pass is not smaller than the first.
+
+    >>> [f"{float(slope):.1e}" for slope in second_pass_slopes(0.0, 2.0, 5e-4, 5e-4)]
+    ['1.0e-03', '5.0e-04']
+    """
+    x, volts = np.asarray(phase_fraction, dtype=float), np.asarray(amplitude, dtype=float)
+    turn, by = second_pass_turn(x, volts, cosine, sine)
+    c, s = np.asarray(cosine, dtype=float), np.asarray(sine, dtype=float)
+    # the turn depends on the phasor of the pass alone: a change of x turns that, one of the amplitude stretches it
+    by_phase = by[..., 0] * s - by[..., 1] * c
+    by_share = by[..., 0] * c + by[..., 1] * s
+    return by_phase, np.divide(by_share, volts, out=np.zeros_like(turn), where=volts > 0.0)
 
 
 def returned_share_of_pass(

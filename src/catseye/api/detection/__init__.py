@@ -1,0 +1,1 @@
+"""One buffer, the frequency plan and whole cycles: functions of detection."""

@@ -1,0 +1,1 @@
+"""Commands of detection: one buffer, the frequency plan, whole cycles."""

@@ -1,0 +1,1 @@
+"""Detection of single buffers, frequency plans, whole cycles from several frequencies."""
