@@ -82,6 +82,18 @@ def main() -> None:
         noise = rng.normal(0.0, 8e-6, 2)
         lines.append(f"{mjd:.8f},{ab + TRANSDUCERS + noise[0]:.7f},{ba + TRANSDUCERS + noise[1]:.7f},8")
     (HERE / "night.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (HERE / "station.csv").write_text("\n".join(station()) + "\n", encoding="utf-8")
+
+
+def station() -> list[str]:
+    """Lines of the mast's logger at the ranger, every five minutes: its sensors scatter, pressure and humidity hold."""
+    rng = np.random.default_rng([SEED, 7])
+    lines = ["mjd_utc,temperature_c,pressure_hpa,humidity_percent"]
+    for step in range(-3, 21):
+        t, p, h = rng.normal(0.0, (0.1, 0.05, 0.4))
+        values = f"{15.4 - 0.15 * step + t:.2f},{PRESSURE_HPA + p:.2f},{HUMIDITY_PERCENT + h:.1f}"
+        lines.append(f"{START_MJD + step * 300.0 / 86_400.0:.6f},{values}")
+    return lines
 
 
 if __name__ == "__main__":

@@ -121,9 +121,3 @@ def test_the_mean_is_the_same_seen_from_either_end(a, b, nodes):
 def test_pressure_carried_by_way_of_a_third_height_is_the_pressure_carried_at_once(a, b, c, t):
     for carry in (path.pressure_at, lambda p, z1, z2: path.hydrostatic_pressure_hpa(p, t, z1, z_to=z2)):
         assert carry(carry(933.0, a, b), b, c) == pytest.approx(carry(933.0, a, c), rel=1e-13)
-
-
-@given(heights, st.floats(1.0, 200.0), st.floats(-40.0, 50.0), st.floats(-40.0, 50.0))
-def test_interpolation_passes_through_both_stations(z1, apart, v1, v2):
-    assert path.interpolate_height(z1, z1, v1, z2=z1 + apart, v2=v2) == pytest.approx(v1, abs=1e-9)
-    assert path.interpolate_height(z1 + apart, z1, v1, z2=z1 + apart, v2=v2) == pytest.approx(v2, abs=1e-9)

@@ -130,9 +130,17 @@ class AcousticResult(Result):
         return self.read
 
 
+@with_units
 def acoustic(
     *files: "str | os.PathLike[str]",
     sheet: "str | os.PathLike[str] | None" = None,
+    weather: "str | os.PathLike[str] | None" = None,
+    station: str | None = None,
+    temperature_c: Annotated[Any, In("deg_C", one=True)] = None,
+    pressure_hpa: Annotated[Any, In("hPa", one=True)] = None,
+    humidity_percent: Annotated[Any, In("percent", one=True)] = None,
+    u_pressure_hpa: Annotated[Any, In("hPa", one=True)] = None,
+    u_humidity_percent: Annotated[Any, In("percent", one=True)] = None,
     model: str = "real_gas",
     air_model: str = AIR_MODEL,
     progress: Progress | None = None,
@@ -141,17 +149,25 @@ def acoustic(
 
     files       recordings .wav or .csv, or travel times .csv (docs/formats/acoustic.md)
     sheet       path, signal and weather of all of them; None: each file's own, its name with .toml
+    weather     table of a weather logger, as `weather` reads it with its sheet, in place of the sheet's readings
+    station     of that table, where it has several
+    temperature_c, pressure_hpa, humidity_percent   one reading for all shots, in place of the sheet's
+    u_pressure_hpa, u_humidity_percent   standard uncertainties; None: the logger's, else the sheet's
     model       formula of the speed of sound: real_gas or cramer1993
     air_model   formula of the index: ciddor_hill1999, rueger1990, iag1999_closed or barrell_sears1963
     progress    called with (what, done, of how many)
 
-    A shot without a temperature is a status. Raises InputError for files that cannot be used, and without any.
+    A shot without a temperature is a status. Raises InputError for files that cannot be used, without any, and for a
+    shot over an hour from a logger's readings; ArgumentError: weather in two ways.
 
     >>> acoustic("acoustic/night.csv").verdict.word
     'good'
+    >>> acoustic("acoustic/night.csv", weather="acoustic/station.csv").verdict.word
+    'good'
     """
-    from catseye.errors import InputError
+    from catseye.errors import ArgumentError, InputError
     from catseye.reduction.air.acoustic_recording import reduce_acoustic
+    from catseye.reduction.air.sound_weather import logger_readings, one_reading
 
     if not files:
         raise InputError("acoustic needs a file (expected a recording or a table of travel times)")
@@ -159,7 +175,16 @@ def acoustic(
     beside = None if sheet is None else place_of(sheet)
     if progress is not None:
         progress("reducing", 0, 1)
-    found = reduce_acoustic(paths, beside, model=model, air_model=air_model)
+    local = one_reading(temperature_c, pressure_hpa, humidity_percent)
+    logger = None if weather is None else place_of(weather)
+    if logger is not None and local is not None:
+        raise ArgumentError("give weather, or one reading of temperature, pressure and humidity", "weather")
+    if logger is None and station is not None:
+        raise ArgumentError("station is one of the table weather", "station", "weather")
+    found = reduce_acoustic(
+        paths, beside, weather=local if logger is None else logger_readings(logger, station),
+        u_pressure_hpa=u_pressure_hpa, u_humidity_percent=u_humidity_percent, model=model, air_model=air_model,
+    )  # fmt: skip
     means = [path.mean for path in found.paths]
     sheets = [beside] if beside is not None else [path.with_suffix(".toml") for path in paths]
     return AcousticResult(
@@ -172,7 +197,7 @@ def acoustic(
         group_refractivity=np.array([mean.refractivity for mean in means]),
         u_group_refractivity=np.array([mean.u_refractivity for mean in means]),
         reduction=found,
-        read=(*paths, *dict.fromkeys(sheets)),
+        read=(*paths, *dict.fromkeys(sheets), *([] if logger is None else [logger])),
     )
 
 

@@ -52,7 +52,7 @@ def test_it_agrees_with_the_formula_of_the_world_meteorological_organisation(row
 def test_saturation_is_at_the_wet_bulb_and_not_as_the_listing_leaves_it_at_the_dry_one():
     e = float(psychrometer.vapour_pressure_of_wet_bulb_hpa(20.0, 14.0, 933.0))
     assert e == pytest.approx(16.04185 - 0.000662 * 933.0 * 6.0, abs=1e-4)  # eq527 at tp = 14, eq523, by hand
-    trap = float(humidity.saturation_pressure_hpa(20.0, 933.0)) - 0.000662 * 933.0 * 0.0  # tp = t
+    trap = float(humidity.saturation(20.0, 933.0).pressure_hpa) - 0.000662 * 933.0 * 0.0  # tp = t
     assert trap - e > 11.0
 
 

@@ -255,6 +255,41 @@ def test_the_weather_of_0_percent_and_0_degrees_is_legal(catseye, tmp_path, code
     assert path["used"] == 2
 
 
+def test_weather_of_a_logger_and_of_options(catseye):
+    """The station's sensors scatter by 0.4 % about the sheet's humidity: 0.01 °C at most."""
+    night = EXAMPLE / "night.csv"
+    (sheet,), (logger,), (held,) = (
+        answer(catseye, night, *options)["paths"]
+        for options in (
+            (),
+            ("--weather", EXAMPLE / "station.csv"),
+            ("--temperature-c", 14, "--pressure-hpa", 930.4, "--humidity-percent", 71, "--u-humidity-percent", 5),
+        )
+    )
+    assert [path["weather_of"] for path in (sheet, logger, held)] == ["night.toml", "station.csv", "one reading"]
+    assert logger["temperature_c"] == pytest.approx(sheet["temperature_c"], abs=0.01)
+    assert logger["temperature_c"] != sheet["temperature_c"]
+    assert held["temperature_c"] == pytest.approx(sheet["temperature_c"], abs=1e-9)
+    assert (logger["u_humidity_percent"], held["u_humidity_percent"]) == pytest.approx((2.0, 5.0))
+    assert held["u_temperature_c"] > sheet["u_temperature_c"] > logger["u_temperature_c"]
+    assert "of station.csv; u 0.3 hPa, 2 %" in run(catseye, night, "--weather", EXAMPLE / "station.csv")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--temperature-c", 14], "the weather lacks --pressure-hpa, --humidity-percent"),
+        (["--station", "WX1"], "--station is one of the table --weather"),
+        (["--weather", EXAMPLE / "station.csv", "--temperature-c", 1, "--pressure-hpa", 930, "--humidity-percent", 1],
+         "give --weather, or one reading"),
+    ],
+)  # fmt: skip
+def test_weather_options_that_do_not_fit_are_2(catseye, arguments, said):
+    status, out, complained = catseye("acoustic", EXAMPLE / "night.csv", *arguments)
+    assert (status, out) == (2, "")
+    assert said in complained
+
+
 @pytest.mark.parametrize("arguments", [[], [FILES[0], "--model", "bogus"], [FILES[0], "--bogus"]])
 def test_wrong_usage_is_2(catseye, arguments):
     assert catseye("acoustic", *arguments)[0] == 2

@@ -35,6 +35,73 @@ def test_wet_bulb_and_mercury(catseye):
     assert again["pressure_hpa"] == pytest.approx(929.382, abs=1e-3)
 
 
+def test_the_gravity_and_the_corrected_mercury_are_told(catseye):
+    """[PARKER04] 1.8, 1.16: 697.72 mm and 979.784 gal; stations of section 1.4.2, +12.1 mgal above 1.13 at AA."""
+    place = ("--latitude-deg", 38.45, "--elevation-m", 797.3)
+    found = asked(catseye, *MERCURY[1:], *place)["barometer"]
+    assert found["corrected_mmhg"] == pytest.approx(697.72, abs=5e-3)
+    assert found["gravity"] == pytest.approx(9.79784, abs=5e-6)
+    assert found["u_gravity"] == 3e-4
+    measured = asked(catseye, *MERCURY[1:], "--gravity-station", "aa")
+    assert measured["barometer"]["gravity"] == pytest.approx(9.79795654, abs=1e-12)
+    assert (measured["barometer"]["u_gravity"], measured["barometer"]["gravity_anomaly"]) == (0.0, None)
+    assert measured["pressure_hpa"] == pytest.approx(697.7206 * 9.79795654 / 9.80665 * 1.33322387415, abs=1e-3)
+    lifted = asked(catseye, *MERCURY[1:], "--gravity-station", "Green Bank AA", *place)["barometer"]
+    assert lifted["gravity_anomaly"] * 1e5 == pytest.approx(12.1, abs=0.05)
+    fall = -3.086e-6 * (797.3 - 2622.0 * 0.3048)  # free air from the marker
+    assert lifted["gravity"] == pytest.approx(9.79795654 + fall, abs=1e-12)
+    assert "barometer" not in asked(catseye, *WEATHER[1:], "--humidity-percent", 50)
+    _, out, _ = catseye(*MERCURY, "--gravity-station", "AB", "--latitude-deg", 38.45)
+    assert "697.72 mm at 0 °C; gravity 9.7979215 m/s² by station Green Bank AB" in " ".join(out.split())
+
+
+def test_humidity_over_ice_goes_in_and_comes_out(catseye):
+    cold = ("--temperature-c=-10", "--pressure-hpa", 933)
+    found = asked(catseye, *cold, "--humidity-over-ice-percent", 80, "--u-humidity-percent", 2)
+    assert found["vapour_pressure_hpa"] == pytest.approx(0.8 * 2.6096, abs=1e-4)  # [PARKER04] eq. 1.4
+    assert found["humidity_over_ice_percent"] == pytest.approx(80.0, abs=1e-9)
+    assert found["uncertainty_of"] == ["humidity"]
+    frost = asked(catseye, *cold, "--frost-point-c", found["frost_point_c"])
+    assert frost["vapour_pressure_hpa"] == pytest.approx(found["vapour_pressure_hpa"], rel=1e-9)
+    assert asked(catseye, *cold, "--humidity-over-ice-percent", 104)["humidity_percent"] < 100.0  # over water
+    assert asked(catseye, *WEATHER[1:], "--humidity-percent", 50)["humidity_over_ice_percent"] is None
+    status, out, _ = catseye("air", *cold, "--humidity-over-ice-percent", 80)
+    assert (status, "over ice      80.00 %, frost point -12.49 °C" in out) == (0, True)
+
+
+@pytest.mark.parametrize("model", ["ciddor_hill1999", "rueger1990", "iag1999_closed", "barrell_sears1963"])
+def test_density_factors_and_coefficients_make_the_index(catseye, model):
+    found = asked(catseye, *WEATHER[1:], "--humidity-percent", 50, "--model", model)
+    density, coefficient = found["density_factors"], found["group_coefficients"]
+    whole = sum(density[gas] * coefficient[gas] for gas in ("dry", "vapour"))
+    assert 1.0 + whole == pytest.approx(found["group_index"], abs=1e-13)
+
+
+def test_owens_factors_are_those_of_the_notes(catseye):
+    """[PARKER04] eqs. 1.23 and 1.24 typed again, and 1.26 at 0.780 µm."""
+    found = asked(catseye, *WEATHER[1:], "--humidity-percent", 50, "--model", "rueger1990")
+    t, e = 293.15, found["vapour_pressure_hpa"]
+    p = 933.0 - e
+    d_s = p / t * (1 + p * (57.90e-8 - 9.3250e-4 / t + 0.25844 / t**2))
+    q = -2.37321e-3 + 2.23366 / t - 710.792 / t**2 + 7.75141e4 / t**3
+    d_w = e / t * (1 + e * (1 + 3.7e-4 * e) * q)
+    assert found["density_factors"] == pytest.approx({"dry": d_s, "vapour": d_w}, rel=1e-12)
+    assert found["group_coefficients"]["dry"] * 1e8 == pytest.approx(7969.183, abs=1e-3)
+
+
+def test_a_clear_sky_cools_a_target_to_dew(catseye):
+    cool = ("--temperature-c", 10, "--pressure-hpa", 933, "--dew-point-c", 5)
+    found = asked(catseye, *cool, "--clear-sky")
+    depression = found["radiative_depression_k"]
+    assert depression == pytest.approx(8.1, abs=0.05)  # a hand-worked balance in `test_condensation`
+    assert found["condensation"]["margin_k"] == pytest.approx(5.0 - depression, abs=0.02)
+    assert found["condensation"]["u_margin_k"] == pytest.approx(depression / 3, rel=0.01)
+    gold = asked(catseye, *cool, "--clear-sky", "--emissivity", 0.03, "--wind", 3)
+    assert gold["radiative_depression_k"] < 0.3  # a thirtieth of glass, more wind
+    assert gold["condensation"]["deposit"] == "none"
+    assert asked(catseye, *cool, "--clear-sky", "--sky-view", 0)["radiative_depression_k"] == pytest.approx(0, abs=1e-9)
+
+
 def test_the_barometers_own_uncertainty_reaches_the_index(catseye):
     given = ("--temperature-c", 20, "--humidity-percent", 50, "--barometer-mmhg", 700, "--mercury-c", 20)
     alone = asked(catseye, *given, "--gravity", 9.79784)["standard_uncertainty"]
@@ -124,6 +191,15 @@ def test_mercury_alone_counts_its_formula_and_no_sensor(catseye):
     assert read["uncertainty_of"] == ["pressure"]
 
 
+def test_a_latitude_in_radians_is_doubted_and_the_same_in_degrees_is_not(catseye):
+    radians, degrees = (
+        asked(catseye, *MERCURY[1:], "--latitude-deg", latitude, "--elevation-m", 797.3)["verdict"]
+        for latitude in (0.6711, 38.45)
+    )
+    assert (radians["word"], degrees["word"]) == ("doubtful", "good")
+    assert "as radians it is 38.45 degrees" in radians["why"]
+
+
 def test_the_text_says_what_the_object_says(catseye):
     status, out, err = catseye(*WEATHER, "--humidity-percent", 50, "--model", "rueger1990")
     assert (status, err) == (0, "")
@@ -145,6 +221,11 @@ def test_the_text_says_what_the_object_says(catseye):
         ((*WEATHER, "--wet-bulb-c", 25), "above the dry bulb"),
         ((*WEATHER, "--frost-point-c", 5), "temperature of ice 5 °C is outside"),
         ((*WEATHER, "--vapour-pressure-hpa", -1), "vapour pressure -1 hPa"),
+        ((*MERCURY, "--gravity-station", "AC"), "gravity station 'AC' is unknown; choose one of AA, B, AB"),
+        ((*MERCURY, "--gravity-station", "AA", "--elevation-m", 1200), "elevation 1200 m is outside"),
+        ((*WEATHER, "--humidity-over-ice-percent", 90), "temperature of ice 20 °C is outside"),
+        ((*WEATHER, "--humidity-percent", 0, "--clear-sky"), "the air; this air is perfectly dry"),
+        ((*WEATHER, "--humidity-percent", 50, "--clear-sky", "--wind", 9), "wind 9 m/s is outside"),
         ((*MERCURY, "--gravity", 979.784), "gravity 979.784 m/s² is outside"),
     ],
 )
@@ -167,6 +248,11 @@ def test_what_cannot_be_is_one_line_and_status_1(catseye, arguments, said):
         (*MERCURY, "--gravity", 9.798, "--latitude-deg", 0),
         (*WEATHER, "--humidity-percent", 50, "--u-surface-c", 0.5),
         (*WEATHER, "--humidity-percent", 50, "--gravity", 9.8),
+        (*WEATHER, "--humidity-percent", 50, "--gravity-station", "AA"),
+        (*MERCURY, "--gravity", 9.798, "--gravity-station", "AA"),
+        (*WEATHER, "--humidity-percent", 50, "--wind", 2),
+        (*WEATHER, "--humidity-percent", 50, "--surface-c", 5, "--clear-sky"),
+        (*WEATHER, "--humidity-percent", 50, "--humidity-over-ice-percent", 50),
         (*WEATHER, "--humidity-percent", 50, "--u-dew-point-c", 0.2),
         (*WEATHER, "--humidity-percent", 50, "--u-temperature-c", -1),
         (*WEATHER, "--humidity-percent", 50, "--u-mercury-c", 1),

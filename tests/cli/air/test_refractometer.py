@@ -14,7 +14,7 @@ KEYS = {
     "path", "path_length", "group_index", "u_group_index", "phase", "mjd_utc", "temperature_c", "pressure_hpa",
     "humidity_percent", "phase_per_index", "budget", "slope", "thermometers", "drift", "noise", "variance_factor",
     "degrees_of_freedom", "absolute", "verdict", "sections", "notes", "series", "readings", "model", "wavelength_um",
-    "modulation_hz", "co2_ppm",
+    "modulation_hz", "co2_ppm", "length_sensitivity_per_m",
 }  # fmt: skip
 HEADER = "mjd_utc,phase_rad,temperature_c,pressure_hpa,humidity_percent"
 
@@ -37,7 +37,7 @@ def test_the_example_is_calibrated_and_its_jump_and_gap_are_named(catseye, tmp_p
     assert found["phase_per_index"] == pytest.approx(-4 * np.pi * 1.5e9 / 299792458.0 * 97.3, rel=1e-9)
     assert found["readings"]["total"] == len(found["series"]["mjd_utc"]) == 438
     assert sorted(p.name for p in out.iterdir()) == [
-        "group_index.csv", "night.svg", "provenance.json", "refractometer.json", "report.html",
+        "acquired.svg", "group_index.csv", "night.svg", "provenance.json", "refractometer.json", "report.html",
     ]  # fmt: skip
     assert json.loads((out / "refractometer.json").read_text()) == found
     with (out / "group_index.csv").open() as stream:
@@ -119,6 +119,7 @@ def test_what_is_missing_is_named(catseye, tmp_path):
     status, _, complaint = catseye(plain(tmp_path, ROWS))
     assert status == 1
     assert "has no sheet night.toml beside it and there is no path length" in complaint
+    assert "--path-length-m" in complaint
     status, _, complaint = catseye(tmp_path / "night.csv", "--sheet", tmp_path / "other.toml")
     assert status == 1
     assert "other.toml: missing" in complaint
@@ -154,3 +155,15 @@ def test_a_path_whose_certificate_ended_before_the_readings_is_doubtful(catseye,
     verdict = json.loads(said)["verdict"]
     assert verdict["word"] == word
     assert ("ended on 2003-09-06" in verdict["why"]) == (word == "doubtful")
+
+
+def test_an_error_of_the_length_counts_as_1_37_to_1_39_say(catseye):
+    """[PARKER04] 1.38: dn/dD = (n - n_0)/D in size; here by moving the length in the index itself, by hand."""
+    found = json.loads(catseye(EXAMPLE, "--json")[1])
+    index = np.array([v for v in found["series"]["group_index"] if v is not None])
+    moved = index - found["group_index"]
+    farthest = moved[np.argmax(np.abs(moved))]
+    length = found["path_length"]
+    # n - n_0 = phase c/(4 pi f D): with D + 1 mm the same phase gives less by (n - n_0)/D per metre
+    by_hand = farthest * (length / (length + 1e-3) - 1.0) / 1e-3
+    assert found["length_sensitivity_per_m"] == pytest.approx(by_hand, rel=1e-4)

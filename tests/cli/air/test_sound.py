@@ -64,6 +64,47 @@ def test_uncertainties_of_the_inputs_are_added(command):
     assert found["standard_uncertainty"] == pytest.approx(squares**0.5, rel=1e-12)
 
 
+@pytest.mark.parametrize("model", ["parker2004", "real_gas"])
+def test_a_speed_gives_the_temperature_back(command, model):
+    """[PARKER04] eqs. 4.6, 4.7: 343.5767 m/s at 933 hPa, 50 % is 20 °C; the other model by its own speed."""
+    there = answer(command, *NOTES, "--model", model)
+    speed = there["speed"]
+    printed = answer(command, "--speed", 343.5767, *NOTES[2:])["temperature_c"]
+    assert printed == pytest.approx(20.0, abs=1.7e-4)  # printed to 1e-4 m/s, 0.6 m/s a degree
+    found = answer(command, "--speed", speed, *NOTES[2:], "--model", model, "--u-speed", 0.06)
+    assert found["temperature_c"] == pytest.approx(20.0, abs=2e-6)
+    slope, formula = there["sensitivity"]["temperature_c"], there["formula_uncertainty"]
+    assert found["u_temperature_c"] == pytest.approx((formula**2 + 0.06**2) ** 0.5 / slope, rel=1e-6)
+    assert found["uncertainty_of"] == ["speed"]
+    assert found["temperatures"][model]["temperature_c"] == found["temperature_c"]
+    assert set(found["temperatures"]) == {"parker2004", "cramer1993", "real_gas"}
+    by_vapour = answer(
+        command, "--speed", speed, *NOTES[2:4], "--vapour-pressure-hpa", there["vapour_pressure_hpa"], "--model", model
+    )
+    assert by_vapour["temperature_c"] == pytest.approx(20.0, abs=2e-6)
+    assert by_vapour["humidity_percent"] == pytest.approx(50.0, abs=1e-4)
+
+
+def test_the_uncertainty_of_a_temperature_by_sound_is_its_scatter():
+    """Readings that scatter as stated, of humidity and of vapour pressure, through the inversion itself."""
+    import numpy as np
+
+    from catseye.atmosphere.sound.speed import temperature_of_speed_c, temperature_of_speed_of_vapour_c
+    from catseye.reduction.air.sound_speed import MeasuredSound
+
+    rng = np.random.default_rng(5)
+    speed, p = rng.normal(344.0, 0.05, 20_000), rng.normal(933.0, 30.0, 20_000)
+    spread = {"u_speed": 0.05, "u_pressure_hpa": 30.0}
+    moist = MeasuredSound(344.0, 933.0, 50.0, u_humidity_percent=8.0, **spread).temperature("real_gas")
+    vapour = MeasuredSound(344.0, 933.0, None, 11.7, u_vapour_pressure_hpa=2.0, **spread).temperature("real_gas")
+    by_humidity = temperature_of_speed_c(speed, p, rng.normal(50.0, 8.0, 20_000), model="real_gas")
+    by_vapour = temperature_of_speed_of_vapour_c(speed, p, rng.normal(11.7, 2.0, 20_000), model="real_gas")
+    for (found, state), scatter in ((moist, by_humidity.std()), (vapour, by_vapour.std())):
+        formula = state.standard_uncertainty / state.sensitivity.temperature_c
+        # 20 000 draws know a scatter to 0.5 %
+        assert np.sqrt(found.u_temperature_c**2 - formula**2) == pytest.approx(scatter, rel=0.03)
+
+
 def test_people_read_the_same(command):
     status, said, complaint = command(*NOTES)
     assert (status, complaint) == (0, "")
@@ -81,7 +122,12 @@ def test_people_read_the_same(command):
         (["--temperature-c", "nan", *NOTES[2:]], 1, "temperature is not a number"),
         ([*NOTES, "--model", "laplace"], 2, "'laplace' is not one of parker2004, cramer1993, real_gas"),
         ([*NOTES, "--u-temperature-c", -1], 2, "not a standard uncertainty"),
-        (NOTES[:4], 2, "Missing option"),
+        (NOTES[:4], 2, "--humidity-percent is missing"),
+        ([*NOTES, "--speed", 343], 2, "give --temperature-c or --speed, not both"),
+        (["--speed", 343, "--pressure-hpa", 933], 2, "give --humidity-percent or --vapour-pressure-hpa"),
+        ([*NOTES, "--u-speed", 0.1], 2, "--u-speed belongs to --speed"),
+        (["--speed", 343, *NOTES[2:], "--u-temperature-c", 0.1], 2, "--u-temperature-c does not belong to --speed"),
+        (["--speed", 34, *NOTES[2:]], 1, "speed of sound 34 m/s"),
     ],
 )
 def test_refusals(command, arguments, status, complaint):

@@ -11,7 +11,7 @@ from catseye.errors import EstimationError, InputError
 from catseye.reduction.air.group_index import phase_slope
 from catseye.reduction.air.refractometer_calibration import calibrate_path
 from catseye.reduction.air.refractometer_night import read_path_readings, read_path_sheet
-from catseye.simulator.laboratory.refractometer import PathPlan, simulate_path_night
+from reduction.air.refractometer_scene import PathPlan, simulate_path_night
 
 NOISY = PathPlan(strays=0.03, patch_c=0.0, drift_mrad_per_hour=0.2)  # random walk of 0.5 mrad a root hour besides
 

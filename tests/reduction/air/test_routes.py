@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.atmosphere.index.air import MODELS, air, group_refractivity_of_vapour
+from catseye.atmosphere.index.air import MODELS, air
 from catseye.atmosphere.weather import humidity
 from catseye.atmosphere.weather.psychrometer import vapour_pressure_of_wet_bulb_hpa, wet_bulb_c
 from catseye.errors import ValidityError
@@ -16,6 +16,7 @@ def reading_of(kind, t, p, e, formula):
     """What each instrument shows in air with the vapour pressure e."""
     return {
         "humidity_percent": lambda: humidity.relative_humidity_percent(e, t, p, formula=formula),
+        "humidity_over_ice_percent": lambda: humidity.relative_humidity_percent(e, t, p, over_ice=True),
         "dew_point_c": lambda: humidity.dew_point_c(e, p, formula),
         "frost_point_c": lambda: humidity.frost_point_c(e, p),
         "wet_bulb_c": lambda: wet_bulb_c(t, e, p),
@@ -31,7 +32,7 @@ def test_every_instrument_gives_the_index_of_the_same_vapour(kind, model):
     shown = float(reading_of(kind, t, p, e, MODELS[model].vapour_formula))
     found, _ = air_by(t, p, Moisture(kind, shown), formula=IndexFormula(model=model))
     assert found.vapour_pressure_hpa == pytest.approx(e, rel=1e-9)
-    expected = group_refractivity_of_vapour(t, p, e, model=model)
+    expected = MODELS[model].refractivity(t, p, e, wavelength_um=0.78, co2_ppm=450.0)
     assert found.group_refractivity == pytest.approx(float(expected), rel=1e-12)
     assert (found.temperature_c, found.pressure_hpa, found.model) == (t, p, model)
 

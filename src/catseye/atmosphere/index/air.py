@@ -148,50 +148,12 @@ def phase_refractivity(
     return _refractivity(weather, wavelength_um, model, co2_ppm, "phase")
 
 
-def group_refractivity_of_vapour(
-    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
-):
-    """Group index of air minus one from the vapour pressure.
-
-    vapour_pressure_hpa   partial pressure of water vapour, hPa, 0 to saturation
-    others                as of `group_refractivity`
-
-    Raises ValidityError with the mask of the offending places.
-
-    >>> round(float(group_refractivity_of_vapour(12.0, 1013.25, 8.41486, wavelength_um=0.658,
-    ...     model="iag1999_closed")) * 1e6, 5)
-    286.33807
-    """
-    chosen = _model_named(model)
-    weather = (temperature_c, pressure_hpa, vapour_pressure_hpa)
-    _check_vapour(chosen, *weather, wavelength_um, co2_ppm)
-    return chosen.refractivity(*weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm)
-
-
-def phase_refractivity_of_vapour(
-    temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
-):
-    """Phase index of air minus one from the vapour pressure.
-
-    Arguments as of `group_refractivity_of_vapour`.
-
-    Raises ValidityError with the mask of the offending places.
-
-    >>> round(float(phase_refractivity_of_vapour(20.0, 1000.0, 0.0, wavelength_um=0.633)) * 1e8, 1)
-    26824.4
-    """
-    chosen = _model_named(model)
-    weather = (temperature_c, pressure_hpa, vapour_pressure_hpa)
-    _check_vapour(chosen, *weather, wavelength_um, co2_ppm)
-    return chosen.refractivity(*weather, wavelength_um=wavelength_um, co2_ppm=co2_ppm, kind="phase")
-
-
 def group_partials(
     temperature_c, pressure_hpa, vapour_pressure_hpa, *, wavelength_um=0.780, model=AIR_MODEL, co2_ppm=450.0
 ) -> Partials:
     """Derivatives of the group index at constant vapour pressure.
 
-    Arguments as of `group_refractivity_of_vapour`.
+    Arguments as of `air_of_vapour`.
 
     Source: the model's formula differentiated; exact for it. [PARKER04] eq. 1.53 prints the third.
 

@@ -136,20 +136,6 @@ def group_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Gases:
     return MODEL.coefficients(wavelength_um, co2_ppm, "group")
 
 
-def phase_coefficients(wavelength_um, co2_ppm=CO2_STANDARD_PPM) -> Gases:
-    """Phase refractivity of each gas per partial pressure over Z T, K/Pa.
-
-    wavelength_um   vacuum wavelength, 0.30 to 1.69 um
-    co2_ppm         carbon dioxide, 0 to 2000 ppm
-
-    Source: [CIDDOR96] eqs. 1 to 3. Good to 3e-8 in the index of sea-level air.
-
-    >>> round(float(phase_coefficients(0.780).dry) * 1e7, 5)
-    7.82231
-    """
-    return MODEL.coefficients(wavelength_um, co2_ppm, "phase")
-
-
 def _standard_zt(temperature_c, pressure_pa, vapour_fraction):
     z = compressibility(temperature_c, pressure_pa / PA_PER_HPA, vapour_fraction).z
     return float(z * (temperature_c + ZERO_CELSIUS_K) / pressure_pa)
@@ -167,6 +153,7 @@ MODEL = IndexModel(
         RefractiveDispersion(powers=VAPOUR_TERMS, scale=1e-8 * VAPOUR_FACTOR * _standard_zt(*STANDARD_VAPOUR)),
     ),
     densities=densities,
+    density_unit="Pa/K",
     density_slopes=density_slopes,
     vapour_formula="ciddor",
     standard_uncertainty=5e-8,  # upper end of the author's 2e-8 to 5e-8

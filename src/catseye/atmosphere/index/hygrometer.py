@@ -92,7 +92,7 @@ def of_relative_humidity(
 
     temperature_c      air temperature, -100 to 100 °C
     pressure_hpa       total pressure, 100 to 1400 hPa
-    humidity_percent   0 to 100 %
+    humidity_percent   0 to 100 %; over ice to 300 %, since air in clouds is supersaturated over ice
     formula            `buck`, `ciddor` or `iapws`; over ice `buck` or `iapws`
     over_ice           the humidity is stated over ice
 
@@ -104,7 +104,7 @@ def of_relative_humidity(
     """
     humidity.AIR_TEMPERATURE.check(temperature_c)
     humidity.PRESSURE.check(pressure_hpa)
-    humidity.HUMIDITY.check(humidity_percent)
+    (humidity.OVER_ICE_HUMIDITY if over_ice else humidity.HUMIDITY).check(humidity_percent)
     share = np.asarray(humidity_percent, float) / 100.0
     at = _saturated(temperature_c, pressure_hpa, formula, over_ice)
     e = share * at.pressure_hpa

@@ -80,20 +80,6 @@ def group_coefficients(wavelength_um) -> Gases:
     return Gases(DRY.group(wavelength_um), VAPOUR.group(wavelength_um))
 
 
-def phase_coefficients(wavelength_um) -> Gases:
-    """Phase refractivity per unit of each density factor, K/hPa.
-
-    wavelength_um   vacuum wavelength, 0.36 to 1.69 um
-
-    Source: [OWENS67] for the vapour, [PECK72] scaled for the dry air: what [PARKER04] eq. 1.25 is the group form of
-    (n_g = n + sigma dn/dsigma). Good to 3e-8 in the index of sea-level air.
-
-    >>> round(float(phase_coefficients(0.780).dry) * 1e5, 6)
-    7.821777
-    """
-    return Gases(DRY.phase(wavelength_um), VAPOUR.phase(wavelength_um))
-
-
 def _inverse_powers(coefficients, kelvin):
     return sum(c / kelvin**i for i, c in enumerate(coefficients))
 

@@ -20,7 +20,6 @@ import numpy as np
 from catseye.atmosphere.index.air import phase_refractivity
 from catseye.atmosphere.limit import ValidInterval
 from catseye.constants import SPEED_OF_LIGHT
-from catseye.errors import EstimationError
 
 INDEX = ValidInterval("index of air", "(ratio)", 1.0, 1.001, "air", places=3)
 MODULATION = ValidInterval("modulation frequency", "Hz", 1e6, 1e12, "the definition of a group index")
@@ -71,54 +70,6 @@ def vacuum_wavelength_of_frequency_um(frequency_hz):
     0.78
     """
     return SPEED_OF_LIGHT / np.asarray(frequency_hz, float) / MICROMETRE
-
-
-def air_wavelength_um(vacuum_um, temperature_c, pressure_hpa, humidity_percent, **air):
-    """Wavelength in air of light with a given vacuum wavelength, um.
-
-    vacuum_um          wavelength in vacuum, um, within the model's limits
-    temperature_c      air temperature, °C
-    pressure_hpa       total pressure, hPa
-    humidity_percent   relative humidity over liquid water, 0 to 100 %
-    air                `model` and `co2_ppm` of `air.phase_refractivity`
-
-    Source: lambda = lambda_0 / n, [CIDDOR96] for n. As good as n, 5e-8 of it. Raises ValidityError as the model does.
-
-    >>> round(float(air_wavelength_um(0.780, 20.0, 933.0, 50.0)), 9)
-    0.779806134
-    """
-    n = 1.0 + phase_refractivity(temperature_c, pressure_hpa, humidity_percent, wavelength_um=vacuum_um, **air)
-    return np.asarray(vacuum_um, float) / n
-
-
-def vacuum_wavelength_um(air_um, temperature_c, pressure_hpa, humidity_percent, **air):
-    """Wavelength in vacuum of light with a given wavelength in air, um.
-
-    The inverse of `air_wavelength_um`.
-
-    air_um             wavelength in this air, um
-    temperature_c      air temperature, °C
-    pressure_hpa       total pressure, hPa
-    humidity_percent   relative humidity over liquid water, 0 to 100 %
-    air                `model` and `co2_ppm` of `air.phase_refractivity`
-
-    Source: lambda_0 = n(lambda_0) lambda, repeated until it converges, to 1e-15. Raises EstimationError if it does not
-    within twenty rounds, ValidityError as the model does.
-
-    >>> round(float(vacuum_wavelength_um(0.779806134, 20.0, 933.0, 50.0)), 9)
-    0.78
-    """
-    in_air = np.asarray(air_um, float)
-    vacuum_um = in_air
-    for _ in range(ROUNDS):
-        before = vacuum_um
-        n = 1.0 + phase_refractivity(temperature_c, pressure_hpa, humidity_percent, wavelength_um=before, **air)
-        vacuum_um = in_air * n
-        if np.all(np.abs(vacuum_um - before) <= 1e-15 * vacuum_um):
-            return vacuum_um
-    raise EstimationError(
-        f"the vacuum wavelength did not converge in {ROUNDS} rounds; is {in_air} um a wavelength in air?"
-    )
 
 
 def sidebands(vacuum_um, modulation_hz, temperature_c, pressure_hpa, humidity_percent, **air) -> Sidebands:

@@ -55,30 +55,6 @@ def hydrostatic_pressure_hpa(
     return p * np.exp(-gravity * DRY_AIR_KG_PER_MOL * lightness * rise / (GAS_CONSTANT * kelvin))
 
 
-def interpolate_height(z, z1, v1, *, z2, v2):
-    """Linear interpolation in height between two stations' values.
-
-    It extrapolates beyond them.
-
-    z    target height, m
-    z1   height of the first station, m
-    v1   value there, any unit
-    z2   height of the second station, m
-    v2   value there, the same unit
-
-    Source: first degree in height, [PARKER04] section 1.3. Two stations at one height give their mean everywhere.
-    Valid where the profile is linear: not near the ground on a sunny day.
-
-    >>> float(interpolate_height(25.0, 0.0, 20.0, z2=50.0, v2=19.0))
-    19.5
-    """
-    z, z1, v1, z2, v2 = (np.asarray(value, float) for value in (z, z1, v1, z2, v2))
-    apart = z2 - z1
-    level = apart == 0.0
-    share = np.where(level, 0.5, (z - z1) / np.where(level, 1.0, apart))
-    return (1.0 - share) * v1 + share * v2
-
-
 def mean_over_height(refractivity_of_height, z_a, z_b, *, nodes=5):
     """Mean refractivity along the straight line between two heights.
 
@@ -95,26 +71,6 @@ def mean_over_height(refractivity_of_height, z_a, z_b, *, nodes=5):
     """
     heights, share = nodes_along(z_a, z_b, nodes)
     return np.sum(share * refractivity_of_height(heights), axis=-1)
-
-
-def covariance_over_height(covariance_of_heights, z_a, z_b, *, nodes=5):
-    """Covariance of means along m straight lines, from that between heights.
-
-    covariance_of_heights   function of two arrays of heights in m, which it broadcasts, giving a covariance
-    z_a                     (m,) m, height of one end of each
-    z_b                     (m,) m, height of the other
-    nodes                   Gauss-Legendre nodes in each, 1 to 100
-
-    Source: covariance of two integrals is the double integral of the covariance; the quadrature of `mean_over_height`,
-    whose mean it belongs to. `profile.Profile.covariance` does the same with the covariance in closed form.
-
-    >>> covariance_over_height(lambda z, other: 0.01 * z * other, [0.0, 0.0], [10.0, 20.0]).round(12)
-    array([[0.25, 0.5 ],
-           [0.5 , 1.  ]])
-    """
-    heights, share = nodes_along(np.atleast_1d(z_a), np.atleast_1d(z_b), nodes)
-    between = covariance_of_heights(heights[:, None, :, None], heights[None, :, None, :])
-    return np.einsum("k,abkl,l->ab", share, between, share)
 
 
 def nodes_along(z_a, z_b, nodes):

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from catseye.atmosphere.limit import ValidInterval
-from catseye.constants import ZERO_CELSIUS_K
 
 WIND = ValidInterval("wind", "m/s", -60.0, 60.0, "the formula for slow winds")
 
@@ -114,41 +113,3 @@ def bent_ray_excess(length, speed, gradient):
     safe = np.where(small, 1.0, u)
     series = square / 6.0 * (1.0 - square * (9.0 / 20.0) * (1.0 - square * (25.0 / 42.0)))
     return np.where(small, series, 1.0 - np.arcsinh(safe) / safe)[()]
-
-
-def mean_temperature_excess(temperature_c, temperature_variance, wind_variance=0.0, *, speed=343.0):
-    """Correction from the temperature of a mean speed to the mean temperature, °C.
-
-    Second order; for the harmonic mean speed of a path.
-
-    temperature_c          of the path, °C
-    temperature_variance   of the temperature along it, K²
-    wind_variance          of the wind along it, m²/s²
-    speed                  of sound, m/s
-
-    Source: derived at the head of this file. Good to third order in the departures.
-
-    >>> round(float(mean_temperature_excess(20.0, 1.0)), 5)
-    0.00256
-    """
-    kelvin = np.asarray(temperature_c, float) + ZERO_CELSIUS_K
-    wind = 2.0 * kelvin / np.asarray(speed, float) ** 2 * np.asarray(wind_variance, float)
-    return 0.75 * np.asarray(temperature_variance, float) / kelvin + wind
-
-
-def mean_refractivity_excess(refractivity, temperature_c, temperature_variance):
-    """Excess of the path mean of n - 1 over n - 1 at the sound's temperature.
-
-    Second order.
-
-    refractivity           n - 1 at the temperature that sound gives
-    temperature_c          that temperature, °C
-    temperature_variance   of the temperature along the path, K²
-
-    Source: derived at the head of this file, n - 1 in proportion to 1/T.
-
-    >>> round(float(mean_refractivity_excess(270e-6, 20.0, 1.0)) * 1e10, 2)
-    7.85
-    """
-    kelvin = np.asarray(temperature_c, float) + ZERO_CELSIUS_K
-    return 0.25 * np.asarray(refractivity, float) * np.asarray(temperature_variance, float) / kelvin**2

@@ -248,6 +248,24 @@ GRAVITY_STATIONS = {
 }
 
 
+def gravity_station(name: str) -> GravityStation:
+    """Gravity station by its name, with or without the place.
+
+    name   of `GRAVITY_STATIONS`, or its last word, in any case
+
+    Raises ValidityError for an unknown name, with those that there are.
+
+    >>> gravity_station("aa").gravity
+    9.79795654
+    """
+    wanted = name.strip().casefold()
+    for full, station in GRAVITY_STATIONS.items():
+        if wanted in (full.casefold(), full.split()[-1].casefold()):
+            return station
+    short = ", ".join(full.split()[-1] for full in GRAVITY_STATIONS)
+    raise ValidityError(f"gravity station {name!r} is unknown; choose one of {short}, or give the gravity")
+
+
 class CarriedPressure(NamedTuple):
     """Pressure at another elevation and its derivatives by the inputs.
 

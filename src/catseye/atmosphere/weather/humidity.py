@@ -59,8 +59,6 @@ GREENSPAN_LN_BETA = (-1.07271e1, 7.61989e-2, -1.74771e-4, 2.46721e-6)
 
 # a chilled mirror reads far below the air's limits; docstrings give the quality of the extrapolation
 PRESSURE = ValidInterval("pressure", "hPa", 100.0, 1400.0, "[CIDDOR96]'s enhancement of saturation")
-DEW_POINT = ValidInterval("dew point", "°C", -100.0, 100.0, "saturation over water")
-FROST_POINT = ValidInterval("frost point", "°C", -100.0, MELTING_C, "ice", places=2)
 OVER_ICE = ValidInterval("temperature of ice", "°C", -100.0, MELTING_C, "ice", places=2)
 AIR_TEMPERATURE = ValidInterval("temperature", "°C", -100.0, 100.0, "saturation over water")
 HUMIDITY = ValidInterval("relative humidity", "%", 0.0, 100.0, "unsaturated air")
@@ -81,64 +79,6 @@ class Saturation(NamedTuple):
     pressure_hpa: Any
     per_c: Any
     per_hpa: Any
-
-
-def saturation_pressure_hpa(temperature_c, pressure_hpa):
-    """Saturation vapour pressure over liquid water, hPa, by Buck's formula.
-
-    temperature_c   air temperature, -40 to 50 °C
-    pressure_hpa    total pressure, 500 to 1100 hPa (enters through the enhancement factor)
-
-    Raises ValidityError outside -100 to 100 °C and 100 to 1400 hPa.
-    Source: [RUEGER90] eq. 5.27 ([PARKER04] eq. 1.3). Good to 0.1 % from -20 to 50 °C, 0.8 % low at -40 °C.
-
-    >>> round(float(saturation_pressure_hpa(20.0, 933.0)), 4)
-    23.4646
-    """
-    AIR_TEMPERATURE.check(temperature_c)
-    PRESSURE.check(pressure_hpa)
-    return saturation(temperature_c, pressure_hpa, "buck").pressure_hpa
-
-
-def ice_saturation_pressure_hpa(temperature_c, pressure_hpa):
-    """Saturation vapour pressure over ice, hPa; never a default.
-
-    temperature_c   air temperature, -50 to 0 °C
-    pressure_hpa    total pressure, 500 to 1100 hPa
-
-    Raises ValidityError outside -100 to 0.01 °C and 100 to 1400 hPa.
-    Source: [RUEGER90] eq. 5.28 ([PARKER04] eq. 1.4). Good to 0.3 %.
-
-    >>> round(float(ice_saturation_pressure_hpa(-10.0, 933.0)), 4)
-    2.6096
-    """
-    return ice_saturation(temperature_c, pressure_hpa, "buck").pressure_hpa
-
-
-def iapws_saturation_pressure_hpa(temperature_c):
-    """Saturation pressure of pure water over liquid, without air, hPa.
-
-    temperature_c   temperature, 0 to 370 °C; extrapolated to supercooled water down to -40 °C
-
-    Source: [IAPWS97] eq. 30. Good to 0.025 % above 0 °C; below, 0.04 % above [MURPHY05] at -20 °C and 0.24 % at -40 °C.
-
-    >>> round(float(iapws_saturation_pressure_hpa(300.0 - 273.15)), 5)
-    35.36589
-    """
-    return _if97(np.asarray(temperature_c, float) + ZERO_CELSIUS_K)[0] / PA_PER_HPA
-
-
-def sublimation_pressure_hpa(temperature_c):
-    """Saturation pressure of pure water over ice, without air, hPa.
-
-    temperature_c   temperature of the ice, -223 to 0.01 °C
-
-    Source: [IAPWS11] eq. 6. Within 0.024 % of [MURPHY05] eq. 7 above -40 °C, 0.064 % at -80 °C.
-
-    >>> round(float(sublimation_pressure_hpa(230.0 - 273.15)), 7)
-    0.0894735
-    """
-    return _sublimation(np.asarray(temperature_c, float) + ZERO_CELSIUS_K)[0] / PA_PER_HPA
 
 
 def enhancement_factor(temperature_c, pressure_hpa):
@@ -166,7 +106,9 @@ def saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
     formula         `buck`, `ciddor` or `iapws`
 
     Only the formula's name is checked, as solvers iterate here.
-    Source: [RUEGER90] eq. 5.27; [CIDDOR96] appendix A; [IAPWS97] eq. 30. Good to 0.1 %; the slopes are analytic.
+    Source: [RUEGER90] eq. 5.27 ([PARKER04] eq. 1.3; at a dew point eq. 1.6); [CIDDOR96] appendix A; [IAPWS97] eq. 30.
+    Good to 0.1 % from -20 to 50 °C; `buck` is 0.8 % low at -40 °C, `iapws` for pure water 0.04 % above [MURPHY05] at
+    -20 °C and 0.24 % at -40 °C. The slopes are analytic.
 
     >>> round(float(saturation(20.0, 1013.25, "ciddor").pressure_hpa), 4)
     23.4858
@@ -180,15 +122,16 @@ def ice_saturation(temperature_c, pressure_hpa, formula="buck") -> Saturation:
 
     With its slopes.
 
-     temperature_c   temperature of the ice, -100 to 0.01 °C
+    temperature_c   temperature of the ice, -100 to 0.01 °C
     pressure_hpa    total pressure, 100 to 1400 hPa
     formula         `buck` or `iapws` (Ciddor gives none over ice)
 
     Raises ValidityError outside these limits: there is no ice above 0.01 °C.
-    Source: [RUEGER90] eq. 5.28; [IAPWS11] eq. 6 with the enhancement factor over ice of [GREENSPAN76]. `iapws` is good
-    to 0.06 % from -40 to 0 °C: the sublimation pressure lies within 0.024 % of [MURPHY05] eq. 7, the enhancement
-    factor 2e-4 (0 °C) to 6e-4 (-40 °C) below the one of the IAPWS virial coefficients of moist air. `buck` lies within
-    0.1 % of it from -40 to 0 °C and 1 % low at -80 °C. The slopes are analytic.
+    Source: [RUEGER90] eq. 5.28 ([PARKER04] eq. 1.4; at a frost point eq. 1.6); [IAPWS11] eq. 6 with the enhancement
+    factor over ice of [GREENSPAN76]. `iapws` is good to 0.06 % from -40 to 0 °C: the sublimation pressure lies within
+    0.024 % of [MURPHY05] eq. 7, the enhancement factor 2e-4 (0 °C) to 6e-4 (-40 °C) below the one of the IAPWS virial
+    coefficients of moist air. `buck` lies within 0.1 % of it from -40 to 0 °C and 1 % low at -80 °C. The slopes are
+    analytic.
 
     >>> round(float(ice_saturation(-10.0, 1013.25, "iapws").pressure_hpa), 4)
     2.6092
@@ -241,44 +184,6 @@ def relative_humidity_percent(vapour_pressure_hpa, temperature_c, pressure_hpa, 
     PRESSURE.check(pressure_hpa)
     saturated = (ice_saturation if over_ice else saturation)(temperature_c, pressure_hpa, formula)
     return 100.0 * np.asarray(vapour_pressure_hpa, float) / saturated.pressure_hpa
-
-
-def vapour_pressure_of_dew_point_hpa(dew_point_c, pressure_hpa, formula="buck"):
-    """Vapour pressure from the dew point, hPa.
-
-    Over liquid water also below 0 °C.
-
-    dew_point_c    dew point, -100 to 100 °C
-    pressure_hpa   total pressure, 100 to 1400 hPa
-    formula        `buck`, `ciddor` or `iapws`
-
-    Raises ValidityError outside these limits.
-    Source: [PARKER04] eq. 1.6. As good as `saturation`: 0.1 % above -20 °C, 1 % (`buck`) above -40 °C, below that an
-    extrapolation of supercooled water that no mirror shows.
-
-    >>> round(float(vapour_pressure_of_dew_point_hpa(9.267, 933.0)), 3)
-    11.732
-    """
-    DEW_POINT.check(dew_point_c)
-    PRESSURE.check(pressure_hpa)
-    return saturation(dew_point_c, pressure_hpa, formula).pressure_hpa
-
-
-def vapour_pressure_of_frost_point_hpa(frost_point_c, pressure_hpa, formula="buck"):
-    """Vapour pressure from the frost point, hPa.
-
-    frost_point_c   frost point, -100 to 0.01 °C
-    pressure_hpa    total pressure, 100 to 1400 hPa
-    formula         `buck` or `iapws`
-
-    Raises ValidityError outside these limits.
-    Source: [PARKER04] eq. 1.6 over ice. As good as `ice_saturation`.
-
-    >>> round(float(vapour_pressure_of_frost_point_hpa(-10.0, 933.0)), 4)
-    2.6096
-    """
-    FROST_POINT.check(frost_point_c)
-    return ice_saturation(frost_point_c, pressure_hpa, formula).pressure_hpa
 
 
 def dew_point_c(vapour_pressure_hpa, pressure_hpa, formula="buck"):

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from catseye.cli.air.weather import uncertainty_or_none
 from catseye.cli.commands import AirModel, Json, Quiet, app
 from catseye.cli.results import Strict, tell
 from catseye.cli.terminal import ProgressLine
@@ -14,6 +15,7 @@ from catseye.names import AIR_MODEL
 
 @app.command(
     epilog="\b\nExample: catseye acoustic examples/acoustic/evening-1.wav --sheet examples/acoustic/evening.toml\n"
+    "Example: catseye acoustic examples/acoustic/night.csv --weather examples/acoustic/station.csv\n"
     "Layouts of FILE and SHEET: catseye help formats/acoustic"
 )
 def acoustic(  # noqa: PLR0913 - its options are its command line
@@ -23,6 +25,25 @@ def acoustic(  # noqa: PLR0913 - its options are its command line
     sheet: Annotated[
         Path | None,
         typer.Option("--sheet", metavar="SHEET.toml", help="Path, signal, weather; FILE.toml if not given."),
+    ] = None,
+    weather: Annotated[
+        Path | None,
+        typer.Option("--weather", metavar="TABLE", help="Weather logger's table, as catseye weather reads it."),
+    ] = None,
+    station: Annotated[str | None, typer.Option("--station", help="Name of the station in that table.")] = None,
+    temperature_c: Annotated[
+        float | None, typer.Option("--temperature-c", help="Temperature of the air for all shots, °C.")
+    ] = None,
+    pressure_hpa: Annotated[float | None, typer.Option("--pressure-hpa", help="Pressure for all shots, hPa.")] = None,
+    humidity_percent: Annotated[
+        float | None, typer.Option("--humidity-percent", help="Relative humidity for all shots, %.")
+    ] = None,
+    u_pressure_hpa: Annotated[
+        float | None, typer.Option("--u-pressure-hpa", callback=uncertainty_or_none, help="Standard uncertainty, hPa.")
+    ] = None,
+    u_humidity_percent: Annotated[
+        float | None,
+        typer.Option("--u-humidity-percent", callback=uncertainty_or_none, help="Standard uncertainty, %."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Directory to write: report, tables, figures.")
@@ -50,10 +71,14 @@ def acoustic(  # noqa: PLR0913 - its options are its command line
     from catseye.api.result import require_writable, save
 
     sheets = [file.with_suffix(".toml") for file in files] if sheet is None else [sheet]
-    require_writable(out, *files, *sheets, table=write)
+    require_writable(out, *files, *sheets, weather, table=write)
     progress = ProgressLine(quiet)
     try:
-        result = measured(*files, sheet=sheet, model=model, air_model=air_model, progress=progress)
+        result = measured(
+            *files, sheet=sheet, weather=weather, station=station, temperature_c=temperature_c,
+            pressure_hpa=pressure_hpa, humidity_percent=humidity_percent, u_pressure_hpa=u_pressure_hpa,
+            u_humidity_percent=u_humidity_percent, model=model, air_model=air_model, progress=progress,
+        )  # fmt: skip
         if out is not None:
             save(result, out, progress=progress, table=write)
         else:

@@ -20,14 +20,19 @@ CarbonDioxide = Annotated[float, typer.Option("--co2-ppm", help="Carbon dioxide,
 @app.command(
     epilog="\b\nExample: catseye air --temperature-c 20 --pressure-hpa 933 --humidity-percent 50\n"
     "Example: catseye air --temperature-c 20 --wet-bulb-c 14 --barometer-mmhg 700 --mercury-c 20 "
-    "--latitude-deg 38.45 --elevation-m 797.3 --model rueger1990"
+    "--latitude-deg 38.45 --elevation-m 797.3 --model rueger1990\n"
+    "Example: catseye air --temperature-c=-5 --humidity-over-ice-percent 90 --pressure-hpa 929 --clear-sky --wind 0.5"
 )
 def air(  # noqa: PLR0913 - its options are its command line
     temperature_c: Temperature,
     pressure_hpa: Annotated[float | None, typer.Option("--pressure-hpa", help="Total pressure, hPa.")] = None,
     humidity_percent: Annotated[
         float | None,
-        typer.Option("--humidity-percent", help="Relative humidity over liquid water, %, or one of the next five."),
+        typer.Option("--humidity-percent", help="Relative humidity over liquid water, %, or one of the next six."),
+    ] = None,
+    humidity_over_ice_percent: Annotated[
+        float | None,
+        typer.Option("--humidity-over-ice-percent", help="Relative humidity over ice, %; air at most 0.01 °C warm."),
     ] = None,
     dew_point_c: Annotated[float | None, typer.Option("--dew-point-c", help="Dew point of a mirror, °C.")] = None,
     frost_point_c: Annotated[float | None, typer.Option("--frost-point-c", help="Frost point of a mirror, °C.")] = None,
@@ -43,11 +48,17 @@ def air(  # noqa: PLR0913 - its options are its command line
     ] = None,
     mercury_c: Annotated[float | None, typer.Option("--mercury-c", help="Temperature of the mercury, °C.")] = None,
     gravity: Annotated[float | None, typer.Option("--gravity", help="Gravity at the barometer, m/s².")] = None,
+    gravity_station: Annotated[
+        str | None,
+        typer.Option("--gravity-station", metavar="AA|B|AB", help="Measured gravity of a station at Green Bank."),
+    ] = None,
     latitude_deg: Annotated[
-        float | None, typer.Option("--latitude-deg", help="Latitude, degrees, for gravity if not given.")
+        float | None,
+        typer.Option("--latitude-deg", help="Latitude, degrees, for gravity, or for a station's anomaly."),
     ] = None,
     elevation_m: Annotated[
-        float | None, typer.Option("--elevation-m", help="Elevation above sea level, m, for gravity.")
+        float | None,
+        typer.Option("--elevation-m", help="Elevation above sea level, m, for gravity; within 50 m of a station."),
     ] = None,
     above_barometer_m: Annotated[
         float, typer.Option("--above-barometer-m", help="Height of this air above the barometer, m.")
@@ -83,6 +94,18 @@ def air(  # noqa: PLR0913 - its options are its command line
     u_surface_c: Annotated[
         float, typer.Option(help="Standard uncertainty of the surface's temperature, °C.", **U)
     ] = 0.0,
+    clear_sky: Annotated[
+        bool,
+        typer.Option("--clear-sky", help="Test a surface cooled by a clear night sky, in place of --surface-c."),
+    ] = False,
+    wind: Annotated[float | None, typer.Option("--wind", help="Wind along that surface, m/s; 1 if not given.")] = None,
+    emissivity: Annotated[
+        float | None,
+        typer.Option("--emissivity", help="Emissivity of that surface; 0.9 (glass) if not given, bare gold 0.03."),
+    ] = None,
+    sky_view: Annotated[
+        float | None, typer.Option("--sky-view", help="Share of the hemisphere that is sky; 1 if not given.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Index of air from any instruments, with sensitivities and uncertainty."""
@@ -92,6 +115,7 @@ def air(  # noqa: PLR0913 - its options are its command line
         temperature_c,
         pressure_hpa,
         humidity_percent,
+        humidity_over_ice_percent=humidity_over_ice_percent,
         dew_point_c=dew_point_c,
         frost_point_c=frost_point_c,
         wet_bulb_c=wet_bulb_c,
@@ -100,6 +124,7 @@ def air(  # noqa: PLR0913 - its options are its command line
         barometer_mmhg=barometer_mmhg,
         mercury_c=mercury_c,
         gravity=gravity,
+        gravity_station=gravity_station,
         latitude_deg=latitude_deg,
         elevation_m=elevation_m,
         above_barometer_m=above_barometer_m,
@@ -117,5 +142,9 @@ def air(  # noqa: PLR0913 - its options are its command line
         u_co2_ppm=u_co2_ppm,
         surface_c=surface_c,
         u_surface_c=u_surface_c,
+        clear_sky=clear_sky,
+        wind=wind,
+        emissivity=emissivity,
+        sky_view=sky_view,
     )
     tell(result, json=json)

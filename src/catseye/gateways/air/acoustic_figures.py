@@ -1,4 +1,4 @@
-"""Figures of acoustic paths: recordings, correlations, temperature over time."""
+"""Figures of acoustic paths: signature, recordings, correlations, temperature over time."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -7,6 +7,7 @@ import numpy as np
 
 from catseye.gateways.air.charts import DIRECTIONS
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled
+from catseye.signal.delay.waveform import sampled
 
 if TYPE_CHECKING:
     from catseye.reduction.air.sound_path import AcousticPath, ChannelTrace
@@ -16,12 +17,39 @@ def acoustic_drawings(path: "AcousticPath") -> dict[str, Figure]:
     """Figures of one path, by name."""
     with styled():
         drawn: dict[str, Figure] = {}
+        if path.shots.traces and path.sheet.signal is not None:
+            drawn["signature"] = _signature(path)
         if path.shots.traces:
             drawn["recording"] = _recording(path.shots.traces)
             drawn["correlation"] = _correlation(path.shots.traces)
         if path.used.any():
             drawn["temperature"] = _in_time(path)
         return drawn
+
+
+def _signature(path: "AcousticPath") -> Figure:
+    """Pure wave that is sent, and its autocorrelation, at the recording's rate.
+
+    Source: [PARKER04] chapter 8, acoustic thermometry, figure 1.
+    """
+    assert path.sheet.signal is not None
+    step = float(np.median(np.diff(path.shots.traces[0].time)))
+    wave = sampled(path.sheet.signal.kind, 1.0 / step, **path.sheet.signal.values)
+    time = step * np.arange(len(wave))
+    autocorrelation = np.correlate(wave, wave, mode="full") / float(wave @ wave)
+    lag = step * (np.arange(len(autocorrelation)) - len(wave) + 1)
+    figure = Figure(figsize=(9.4, 2.9), layout="constrained")
+    pure, peak = figure.subplots(1, 2, width_ratios=(2.2, 1.0))
+    pure.plot(time * 1e3, wave, color=SERIES[0], lw=0.7)
+    pure.set(xlabel="time (ms)", ylabel="signal (units of the sheet)")
+    pure.set_title(f"Signature: {path.sheet.signal.kind}, {len(wave)} samples")
+    pure.margins(x=0.0)
+    peak.plot(lag * 1e3, autocorrelation, color=SERIES[2], lw=0.7)
+    peak.axhline(0.0, color=FAINT, lw=0.6)
+    peak.set(xlabel="delay (ms)", title="Its autocorrelation")
+    width = 0.1 * float(time[-1])
+    peak.set_xlim(-width * 1e3, width * 1e3)
+    return figure
 
 
 def _recording(traces: Sequence["ChannelTrace"]) -> Figure:
@@ -70,7 +98,9 @@ def _in_time(path: "AcousticPath") -> Figure:
     )
     panels[0].errorbar(minutes, t, noise, fmt="o", color=SERIES[0], ms=4, elinewidth=1.0, label="acoustic (bar: noise)")
     station = path.shots.weather[0][used]
-    panels[0].plot(minutes, station, color=SERIES[1], lw=1.1, ls="--", label="thermometer of the sheet")
+    if np.isfinite(station).any():
+        label = f"thermometer: {path.weather_of}"
+        panels[0].plot(minutes, station, color=SERIES[1], lw=1.1, ls="--", label=label)
     panels[0].set_ylabel("mean temperature of the path (°C)")
     panels[0].legend(loc="best")
     if bidirectional:

@@ -36,6 +36,9 @@ def _path(path: "AcousticPath") -> dict[str, Any]:
         "length": sheet.length_m,
         "model": path.model,
         "air_model": path.air_model,
+        "weather_of": path.weather_of,
+        "u_pressure_hpa": path.u_weather[0],
+        "u_humidity_percent": path.u_weather[1],
         "used": over.used,
         "temperature_c": over.temperature_c,
         "u_temperature_c": over.u_temperature_c,
@@ -91,6 +94,7 @@ def words(path: "AcousticPath") -> list[tuple[str, str]]:
         ("Path", f"{ends}; {over.used} of {total} shots used, {ways}"),
         ("Temperature", f"{over.temperature_c:.3f} °C, u {over.u_temperature_c:.3f} °C (mean of the shots{spread})"),
         ("Contributions", f"{largest} °C in one shot; all but time are common to all shots"),
+        ("Weather", f"of {path.weather_of}; u {path.u_weather[0]:.3g} hPa, {path.u_weather[1]:.3g} %"),
         ("Wind", f"{over.wind:+.2f} m/s from {sheet.ranger} to {sheet.target}"),
         ("Index", f"n_g - 1 = {over.refractivity / PPM:.3f} ppm, u {over.u_refractivity / PPM:.3f} ppm, "
                   f"at {sheet.wavelength_um:g} µm ({path.air_model}; sound by {path.model})"),

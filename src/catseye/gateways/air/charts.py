@@ -67,7 +67,7 @@ def _acoustic_in_time(path: "AcousticPath", tail: str) -> list[ChartBlock]:
         Axis("mean temperature of the path", "°C", np.concatenate([air.temperature_c[used], station]), digits=4),
         u=np.concatenate([air.u_temperature_c[used], np.full(count, np.nan)]),
         group=[0] * count + [1] * count,
-        groups=("acoustic", "thermometer of the sheet"),
+        groups=("acoustic", "thermometer"),
     )
     blocks = [
         ChartBlock(

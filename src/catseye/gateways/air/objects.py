@@ -8,6 +8,7 @@ from catseye.gateways.writers.passage import Passage
 from catseye.reduction.air.stated import contributions
 
 if TYPE_CHECKING:
+    from catseye.reduction.air.routes import MercuryColumn
     from catseye.reduction.air.weather_index import WeatherIndex
 
 
@@ -15,6 +16,8 @@ def air_object(found: "WeatherIndex") -> dict[str, Any]:
     """Object that `catseye air --json` prints."""
     state = found.state
     surface = {} if found.condensation is None else {"condensation": found.condensation._asdict()}
+    cooling = {} if found.depression_k is None else {"radiative_depression_k": found.depression_k}
+    barometer = {} if found.mercury is None else {"barometer": _barometer(found.mercury)}
     return {
         "verdict": found.verdict.to_object(),
         "model": state.model,
@@ -27,13 +30,30 @@ def air_object(found: "WeatherIndex") -> dict[str, Any]:
         "phase_index": state.phase_index,
         "vapour_pressure_hpa": state.vapour_pressure_hpa,
         "dew_point_c": state.dew_point_c,
+        "frost_point_c": found.frost_point_c,
+        "humidity_over_ice_percent": found.humidity_over_ice_percent,
+        "density_factors": found.density_factors._asdict(),
+        "density_unit": found.density_unit,
+        "group_coefficients": found.group_coefficients._asdict(),
         "group_wavelength": state.group_wavelength,
         "sensitivity": state.sensitivity._asdict(),
         "phase_sensitivity": state.phase_sensitivity._asdict(),
         "standard_uncertainty": found.u,
         "formula_uncertainty": found.u_formula,
         "uncertainty_of": list(found.stated),
+        **barometer,
         **surface,
+        **cooling,
+    }
+
+
+def _barometer(mercury: "MercuryColumn") -> dict[str, Any]:
+    return {
+        "corrected_mmhg": mercury.corrected_mmhg,
+        "gravity": mercury.gravity,
+        "u_gravity": mercury.u_gravity,
+        "gravity_of": mercury.of,
+        "gravity_anomaly": mercury.anomaly,
     }
 
 
@@ -60,12 +80,47 @@ def air_passages(found: "WeatherIndex") -> list[Passage]:
         "pressure": f"{spread(answer['pressure_hpa'], '.3f')} hPa",
         "vapour": f"{spread(answer['vapour_pressure_hpa'], '.3f')} hPa, {spread(answer['humidity_percent'], '.2f')} %, "
         f"dew point {dew_point}{'' if dew_point == 'none' else ' °C'}",
+        **_over_ice(answer),
+        "gases": _gases(answer),
         "modulation": f"{spread(answer['group_wavelength'], '.9f')} m a wavelength at 1500 MHz",
         "formula": f"{answer['model']}, {spread(answer['wavelength_um'], 'g')} µm",
     }
+    if found.mercury is not None:
+        rows["mercury"] = _mercury(answer["barometer"])
+    if found.depression_k is not None:
+        rows["clear sky"] = f"cools the surface {spread(found.depression_k, '.1f')} K below the air, good to a third"
     if found.condensation is not None:
         rows["surface"] = found.condensation.lines()[0]
     return [Passage(title, text) for title, text in rows.items()]
+
+
+def _over_ice(answer: dict[str, Any]) -> dict[str, str]:
+    """Row of air at or below 0 °C."""
+    over_ice = spread(answer["humidity_over_ice_percent"], ".2f")
+    if over_ice == "none":
+        return {}
+    return {"over ice": f"{over_ice} %, frost point {spread(answer['frost_point_c'], '.2f')} °C"}
+
+
+def _gases(answer: dict[str, Any]) -> str:
+    """Parts of both gases in the group refractivity: density factor times coefficient, in the formula's unit."""
+    density, coefficient = answer["density_factors"], answer["group_coefficients"]
+    parts = [
+        f"{gas} {spread(np.multiply(density[key], coefficient[key]), '.3f', 1e6)} ppm (density factor {name} "
+        f"{spread(density[key], '.6g')} of {spread(coefficient[key], '.4f', 1e6)} ppm)"
+        for key, gas, name in (("dry", "dry air", "D_s"), ("vapour", "vapour", "D_w"))
+    ]
+    return f"{', '.join(parts)}, factors in {answer['density_unit']}"
+
+
+def _mercury(barometer: dict[str, Any]) -> str:
+    anomaly = ""
+    if barometer["gravity_anomaly"] is not None:
+        anomaly = f", {spread(barometer['gravity_anomaly'], '+.1f', 1e5)} mgal of anomaly"
+    return (
+        f"{spread(barometer['corrected_mmhg'], '.2f')} mm at 0 °C; gravity {spread(barometer['gravity'], '.7f')} m/s² "
+        f"by {barometer['gravity_of']}{anomaly}"
+    )
 
 
 def spread(values: Any, form: str, factor: float = 1.0) -> str:

@@ -1,10 +1,10 @@
-"""Figures of a refractometer path: the night with residuals, and phase against weather."""
+"""Figures of a refractometer path: data as acquired, the night with residuals, phase against weather."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from catseye.constants import PPM
+from catseye.constants import PPM, TWO_PI
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, Figure, styled, svg
 from catseye.reduction.air.group_index import phase_slope
 
@@ -13,15 +13,47 @@ if TYPE_CHECKING:
 
 
 def refractometer_figures(calibration: "PathCalibration") -> dict[str, Figure]:
-    """Figures of the night with residuals, and phase against weather."""
+    """Figures of the data as acquired, of the night with residuals, and phase against weather."""
     with styled():
-        return {"night": _night(calibration), "slope": _line(calibration)}
+        return {"acquired": _acquired(calibration), "night": _night(calibration), "slope": _line(calibration)}
+
+
+def acquired_svg(calibration: "PathCalibration") -> str:
+    """SVG text of the figure of the data as acquired."""
+    with styled():
+        return svg(_acquired(calibration))
 
 
 def night_svg(calibration: "PathCalibration") -> str:
     """SVG text of the night's figure."""
     with styled():
         return svg(_night(calibration))
+
+
+def _acquired(calibration: "PathCalibration") -> Figure:
+    """Data as acquired: the phase within its turn, each thermometer, pressure and humidity.
+
+    Source: [PARKER04] chapter 8, refractivity, figure 1 (D0309_1).
+    """
+    readings = calibration.readings
+    hours = readings.hours
+    figure = Figure(figsize=(9.4, 7.2), layout="constrained")
+    phase, warm, pressure, humid = figure.subplots(4, 1, sharex=True)
+    phase.scatter(hours, np.mod(readings.phase, TWO_PI), s=4, c=SERIES[0], lw=0)
+    phase.set(ylabel="phase (rad)", ylim=(-0.2, TWO_PI + 0.2))
+    phase.set_title(f"{readings.sheet.path}: data as acquired, {len(hours)} readings")
+    for k, name in enumerate(readings.thermometers):
+        label = name.removeprefix("temperature_").removesuffix("_c")
+        colour = SERIES[k % len(SERIES)]
+        warm.plot(hours, readings.temperature_c[:, k], color=colour, lw=0.6, alpha=0.8, label=label)
+    warm.set_ylabel("temperature (°C)")
+    warm.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="thermometer", title_fontsize=8.5)
+    pressure.scatter(hours, readings.pressure_hpa, s=4, c=SERIES[1], lw=0)
+    pressure.set_ylabel("pressure (hPa)")
+    pressure.ticklabel_format(axis="y", useOffset=False)
+    humid.scatter(hours, readings.humidity_percent, s=4, c=SERIES[2], lw=0)
+    humid.set(ylabel="humidity (%)", xlabel=f"hours since MJD {readings.mjd_utc[0]:.4f} UTC")
+    return figure
 
 
 def _night(calibration: "PathCalibration") -> Figure:

@@ -60,6 +60,7 @@ def refractometer_object(calibration: "PathCalibration") -> dict[str, Any]:
         },
         "variance_factor": calibration.variance_factor,
         "degrees_of_freedom": calibration.degrees_of_freedom,
+        "length_sensitivity_per_m": calibration.length_sensitivity,
         "absolute": _absolute(calibration),
         "sections": _sections(calibration),
         "notes": calibration.notes,
@@ -133,6 +134,11 @@ def passages(calibration: "PathCalibration") -> list[Passage]:
             + (f", as air of {np.nanmin(t):.2f} to {np.nanmax(t):.2f} °C" if np.isfinite(t).any() else ""),
         ),
         Passage("The length", _length(calibration)),
+        Passage(
+            "Its error",
+            f"25 mm of it change the index by {0.025e9 * abs(calibration.length_sensitivity):.2g}e-9 at most, at the "
+            "reading farthest from the calibration's",
+        ),
     ]
     return passages + [Passage("Note", note) for note in calibration.notes]
 
@@ -227,12 +233,13 @@ def write_refractometer(
     directory     existing, from `writers.output.atomic_directory`
     progress      called for each file
     """
-    from catseye.gateways.air.refractometer_figures import night_svg  # matplotlib is heavy
+    from catseye.gateways.air.refractometer_figures import acquired_svg, night_svg  # matplotlib is heavy
 
     when = datetime.now(UTC)
     files: Files = {
         "group_index.csv": lambda: series_csv(calibration),
         "refractometer.json": lambda: json_page(refractometer_object(calibration)),
+        "acquired.svg": lambda: acquired_svg(calibration),
         "night.svg": lambda: night_svg(calibration),
         "report.html": lambda: report_page(refractometer_report(calibration, when)),
     }

@@ -8,7 +8,9 @@ from catseye.gateways.air.objects import spread
 from catseye.gateways.writers.passage import Passage
 
 if TYPE_CHECKING:
-    from catseye.reduction.air.sound_speed import SoundSpeed
+    from collections.abc import Mapping
+
+    from catseye.reduction.air.sound_speed import SoundSpeed, TemperatureBySound
 
 
 def sound_object(found: "SoundSpeed") -> dict[str, Any]:
@@ -23,6 +25,7 @@ def sound_object(found: "SoundSpeed") -> dict[str, Any]:
         "temperature_c": found.temperature_c,
         "pressure_hpa": found.pressure_hpa,
         "humidity_percent": found.humidity_percent,
+        "u_temperature_c": found.u_temperature_c,
         "co2_ppm": found.co2_ppm if MODELS[state.model].has_co2 else None,
         "speed": state.speed,
         "dry_speed": state.dry_speed,
@@ -36,6 +39,16 @@ def sound_object(found: "SoundSpeed") -> dict[str, Any]:
         "models": {name: _speed(each) for name, each in found.by_formula.items()},
         "notes_gamma_w": found.misprint._asdict(),
         "dispersion": [excess._asdict() for excess in found.dispersion],
+        **({} if found.temperatures is None else {"temperatures": _temperatures(found.temperatures)}),
+    }
+
+
+def _temperatures(by_formula: "Mapping[str, TemperatureBySound | ValidityError]") -> dict[str, Any]:
+    return {
+        name: {"temperature_c": None, "u_temperature_c": None, "reason": str(each)}
+        if isinstance(each, ValidityError)
+        else each._asdict()
+        for name, each in by_formula.items()
     }
 
 
@@ -79,4 +92,20 @@ def sound_passages(found: "SoundSpeed") -> list[Passage]:
         "thermometry",
         "dispersion": f"at {low['frequency_hz']:g} Hz faster by {spread(low['phase_excess'], '.3f')} m/s",
     }
+    if found.temperatures is not None:
+        rows = {**_temperature_rows(answer, found.uncertainty_words), **rows}
     return [Passage(title, text) for title, text in rows.items()]
+
+
+def _temperature_rows(answer: dict[str, Any], words: str) -> dict[str, str]:
+    by_formula = "; ".join(
+        f"{name} {spread(item['temperature_c'], '.3f')} ± {spread(item['u_temperature_c'], '.2g')} °C"
+        if item["temperature_c"] is not None
+        else f"{name}: {item['reason']}"
+        for name, item in answer["temperatures"].items()
+    )
+    return {
+        "temperature": f"{spread(answer['temperature_c'], '.4f')} ± {spread(answer['u_temperature_c'], '.2g')} °C by "
+        f"{answer['model']} (1σ; {words})",
+        "by formula": by_formula,
+    }

@@ -9,8 +9,10 @@ from catseye.constants import PPM
 from catseye.gateways.writers.columns import Column, Table, each
 
 if TYPE_CHECKING:
+    from catseye.reduction.air.ray_path import AirPath
     from catseye.reduction.air.refractometer_calibration import PathCalibration
     from catseye.reduction.air.sound_path import AcousticPath
+    from catseye.reduction.air.weather_series import WeatherSeries
 
 PAGE = "acoustic.md"
 
@@ -160,6 +162,96 @@ GROUP_INDEX = Table["PathCalibration"](
         ),
     ),
 )
+
+
+WEATHER_INDEX = Table["WeatherSeries"](
+    "weather_index.csv",
+    "weather.md",
+    (
+        Column("mjd_utc", "d", "time, Modified Julian Date", lambda w: w.mjd_utc, ".8f"),
+        Column("station", "", "weather station", lambda w: w.station),
+        Column("line", "", "line of the reading in the logger's table", lambda w: w.table.lines[w.rows]),
+        Column("temperature_c", "deg_C", "air temperature", lambda w: np.asarray(w.index.state.temperature_c), ".4f"),
+        Column("pressure_hpa", "hPa", "pressure at the station", lambda w: w.pressure_hpa, ".4f"),
+        Column(
+            "humidity_percent",
+            "percent",
+            "relative humidity over liquid water",
+            lambda w: np.asarray(w.index.state.humidity_percent),
+            ".3f",
+        ),
+        Column(
+            "vapour_pressure_hpa",
+            "hPa",
+            "partial pressure of the vapour",
+            lambda w: np.asarray(w.index.state.vapour_pressure_hpa),
+            ".4f",
+        ),
+        Column(
+            "group_refractivity_ppm",
+            "ppm",
+            "group refractivity, n_g - 1",
+            lambda w: np.asarray(w.index.state.group_refractivity) / PPM,
+            ".4f",
+        ),
+        Column(
+            "u_group_refractivity_ppm",
+            "ppm",
+            "standard uncertainty of the group refractivity",
+            lambda w: np.broadcast_to(w.index.u, w.rows.shape) / PPM,
+            ".4f",
+        ),
+    ),
+)
+
+
+AIR_PROFILE = Table["AirPath"](
+    "air_profile.csv",
+    "weather.md",
+    (
+        Column("z_m", "m", "height", lambda p: p.levels.z, ".3f"),
+        Column("temperature_c", "deg_C", "air temperature", lambda p: p.levels.temperature_c, ".4f"),
+        Column(
+            "u_temperature_c",
+            "deg_C",
+            "standard uncertainty of the temperature",
+            lambda p: p.levels.u_temperature_c,
+            ".4f",
+        ),
+        Column("pressure_hpa", "hPa", "pressure", lambda p: p.levels.pressure_hpa, ".4f"),
+        Column(
+            "humidity_percent",
+            "percent",
+            "relative humidity over liquid water",
+            lambda p: p.levels.humidity_percent,
+            ".3f",
+        ),
+        Column(
+            "group_refractivity_ppm",
+            "ppm",
+            "group refractivity, n_g - 1",
+            lambda p: p.levels.group_refractivity / PPM,
+            ".4f",
+        ),
+        Column(
+            "u_group_refractivity_ppm",
+            "ppm",
+            "its standard uncertainty by the weather",
+            lambda p: p.levels.u_group_refractivity / PPM,
+            ".4f",
+        ),
+    ),
+)
+
+
+def air_profile_csv(path: "AirPath") -> str:
+    """Table of the smooth air over height."""
+    return AIR_PROFILE.csv(path)
+
+
+def weather_index_csv(series: "WeatherSeries") -> str:
+    """Table of a logger's usable rows with their index."""
+    return WEATHER_INDEX.csv(series)
 
 
 def path_temperatures_csv(paths: Sequence["AcousticPath"]) -> str:

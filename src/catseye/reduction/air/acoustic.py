@@ -6,6 +6,8 @@ Two directions at once give the wind and take it out (`atmosphere.sound.path`); 
 Errors common to all measurements of a path are modelled as common: its length, the delay of loudspeaker and microphone,
 the station's pressure and humidity, the crosswind, the bend of the ray, the formula itself. Only the times are
 independent.
+
+Source: [PARKER04] chapter 4 (delay by correlation, both directions).
 """
 
 from dataclasses import dataclass, replace

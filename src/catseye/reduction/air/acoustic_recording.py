@@ -6,6 +6,7 @@ A file is reduced by its sheet; files of one sheet are one path. A shot without 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from catseye.records.files.refusal import refusal
 from catseye.records.night.recording import AcousticSheet, Recording, TravelTimes, read_recording, read_sheet
 from catseye.reduction.air.acoustic import PathTemperatures, PathWind, SoundLine, StationAir, path_temperatures
 from catseye.reduction.air.sound_path import AcousticPath, AcousticReduction, ChannelTrace, SoundShots
+from catseye.reduction.air.sound_weather import QUANTITIES, SoundWeather, sheet_readings
 from catseye.signal.delay.arrival import DelayPlan, DelayStatus
 from catseye.signal.delay.waveform import sampled
 
@@ -29,6 +31,9 @@ def reduce_acoustic(
     files: Sequence[Path],
     sheet: Path | None = None,
     *,
+    weather: SoundWeather | None = None,
+    u_pressure_hpa: float | None = None,
+    u_humidity_percent: float | None = None,
     model: str = THERMOMETRY,
     air_model: str = AIR_MODEL,
 ) -> AcousticReduction:
@@ -36,6 +41,8 @@ def reduce_acoustic(
 
     files       .wav or .csv
     sheet       of all of them; None: each file's own, its name with .toml
+    weather     of all paths; None: the sheets', or the tables' columns
+    u_pressure_hpa, u_humidity_percent   standard uncertainties of the weather; None: the weather's own, or the sheets'
     model       formula of the speed of sound, a name in `atmosphere.sound.speed.MODELS`
     air_model   formula of the index, a name in `atmosphere.index.air.MODELS`
 
@@ -47,23 +54,48 @@ def reduce_acoustic(
         if sheet_path.resolve() == file.resolve():
             raise refusal(file.name, "is both recording and sheet (expected a sheet .toml)")
         groups.setdefault(sheet_path.resolve(), (sheet_path, []))[1].append(file)
-    paths = (_path(sheet_path, members, model, air_model) for sheet_path, members in groups.values())
+    local = _Local(weather, u_pressure_hpa, u_humidity_percent)
+    paths = (_path(sheet_path, members, local, model, air_model) for sheet_path, members in groups.values())
     return AcousticReduction(tuple(paths))
 
 
-def _path(sheet_path: Path, files: Sequence[Path], model: str, air_model: str) -> AcousticPath:
+class _Local(NamedTuple):
+    """Weather of all paths, with its standard uncertainties; None: of the files."""
+
+    readings: SoundWeather | None
+    u_pressure_hpa: float | None
+    u_humidity_percent: float | None
+
+    def u(self, readings: SoundWeather | None, sheet: AcousticSheet, sheet_file: str) -> tuple[float, float]:
+        """Standard uncertainties of pressure and humidity; InputError where nothing states one."""
+        values = []
+        for name in ("u_pressure_hpa", "u_humidity_percent"):
+            stated = (getattr(self, name), getattr(readings, name, None), getattr(sheet, name))
+            value = next((item for item in stated if item is not None), None)
+            if value is None:
+                raise refusal(
+                    sheet_file, f"{name} is missing (expected it in the sheet, the logger's, or as an option)"
+                )
+            values.append(value)
+        return values[0], values[1]
+
+
+def _path(sheet_path: Path, files: Sequence[Path], local: _Local, model: str, air_model: str) -> AcousticPath:
     sheet, digest = read_sheet(sheet_path)
-    hashes = {sheet_path.name: digest}
-    parts = []
+    readings = local.readings or sheet_readings(sheet, sheet_path.name)
+    hashes = {sheet_path.name: digest, **(readings.hashes if readings else {})}
+    parts, columns = [], 0
     for path in files:
         read = read_recording(path, sheet)
         if read.file in hashes:
             raise refusal(read.file, "appears twice, or two files have that name (expected each once, different names)")
         hashes[read.file] = read.digest
         try:
-            parts.append(
-                _timed(read, sheet) if isinstance(read, TravelTimes) else _recorded_shots(read, sheet, sheet_path.name)
-            )
+            if isinstance(read, TravelTimes):
+                columns += _require_one_weather(read, local.readings)
+                parts.append(_timed(read, sheet, readings))
+            else:
+                parts.append(_recorded_shots(read, sheet, sheet_path.name, readings))
         except ValidityError as problem:
             raise refusal(read.file, str(problem)) from problem
     shots = _joined(parts, sheet_path.name)
@@ -72,8 +104,10 @@ def _path(sheet_path: Path, files: Sequence[Path], model: str, air_model: str) -
             sheet_path.name,
             "u_wind_m_per_s is missing (expected wind_m_per_s and its u where one direction is measured)",
         )
+    source = None if columns == len(parts) else readings
+    u_weather = local.u(source, sheet, sheet_path.name)
     try:
-        temperatures = _temperatures(shots, sheet, model, air_model)
+        temperatures = _temperatures(shots, sheet, u_weather, model, air_model)
     except ValidityError as problem:
         raise refusal(sheet_path.name, str(problem)) from problem
     return AcousticPath(
@@ -84,10 +118,26 @@ def _path(sheet_path: Path, files: Sequence[Path], model: str, air_model: str) -
         model=model,
         air_model=air_model,
         hashes=hashes,
+        weather_of=source.source if source else "the table's columns",
+        u_weather=u_weather,
+        doubts=source.doubts_at(shots.mjd) if source else (),
     )
 
 
-def _recorded_shots(recording: Recording, sheet: AcousticSheet, sheet_file: str) -> SoundShots:
+def _require_one_weather(times: TravelTimes, readings: SoundWeather | None) -> bool:
+    """True for a table with pressure and humidity of its own; InputError where other readings contradict them."""
+    complete = {"pressure_hpa", "humidity_percent"} <= times.weather.keys()
+    if complete and readings is not None:
+        raise refusal(
+            times.file,
+            f"has pressure_hpa and humidity_percent in its rows, and {readings.source} has others (expected one)",
+        )
+    return complete
+
+
+def _recorded_shots(
+    recording: Recording, sheet: AcousticSheet, sheet_file: str, readings: SoundWeather | None
+) -> SoundShots:
     """Travel times of the shots in a recording."""
     sampling_hz = recording.sampling_hz or sheet.sampling_hz
     start = sheet.start_of(recording.file)
@@ -100,7 +150,12 @@ def _recorded_shots(recording: Recording, sheet: AcousticSheet, sheet_file: str)
     assert sheet.signal is not None
     emission = sheet.emission_s + (sheet.interval_s or 0.0) * np.arange(sheet.shots)
     mjd = start + emission / SECONDS_PER_DAY
-    weather = sheet.weather_at(mjd)
+    if readings is None:
+        raise refusal(
+            sheet_file,
+            "has no [[weather]] (expected it, a logger's table as weather, or temperature, pressure and humidity)",
+        )
+    weather = readings.at(mjd)
     flight = sheet.length_m / sound(*weather, model=THERMOMETRY, co2_ppm=sheet.co2_ppm).speed
     listener = _Listener(recording, sheet, sampling_hz, sampled(sheet.signal.kind, sampling_hz, **sheet.signal.values))
     sent, u_sent, loop = emission, np.zeros(len(mjd)), None
@@ -223,14 +278,21 @@ class _Listener:
         return samples[max(0, int(begin * self.sampling_hz)) : max(0, int(until * self.sampling_hz))]
 
 
-def _timed(times: TravelTimes, sheet: AcousticSheet) -> SoundShots:
-    """Rows of a table of travel times.
+def _timed(times: TravelTimes, sheet: AcousticSheet, readings: SoundWeather | None) -> SoundShots:
+    """Rows of a table of travel times, with the readings' weather where it has none.
 
-    The sheet's weather where the table has none.
+    Without any temperature it is nan: of travel times it is shown beside the result, and not used.
     """
-    names = ("temperature_c", "pressure_hpa", "humidity_percent")
-    from_sheet = sheet.weather_at(times.mjd)
-    t, p, h = (times.weather.get(name, value) for name, value in zip(names, from_sheet, strict=True))
+    absent = [name for name in QUANTITIES[1:] if name not in times.weather]
+    if readings is None and absent:
+        raise refusal(
+            times.file,
+            f"has no column {absent[0]}, and its sheet no [[weather]] (expected {' and '.join(QUANTITIES[1:])} in the "
+            "table, [[weather]], a logger's table as weather, or temperature, pressure and humidity)",
+        )
+    needed = readings is not None and any(name not in times.weather for name in QUANTITIES)
+    local = readings.at(times.mjd) if readings is not None and needed else (np.full(len(times.mjd), np.nan),) * 3
+    t, p, h = (times.weather.get(name, value) for name, value in zip(QUANTITIES, local, strict=True))
     offset, count = sheet.clock_offset_us * MICROSECOND, len(times.mjd)
     u = np.zeros(count) if times.u_time is None else times.u_time
     u = np.hypot(u, sheet.u_time_us * MICROSECOND)
@@ -293,7 +355,9 @@ def frequency_hz(sheet: AcousticSheet) -> float:
     return DelayPlan(samples, sampling_hz=sampling_hz, window=1e-3).bandwidth / TWO_PI
 
 
-def _temperatures(shots: SoundShots, sheet: AcousticSheet, model: str, air_model: str) -> PathTemperatures:
+def _temperatures(
+    shots: SoundShots, sheet: AcousticSheet, u_weather: tuple[float, float], model: str, air_model: str
+) -> PathTemperatures:
     one_way = shots.time_ba is None
     u_offset = sheet.u_clock_offset_us * MICROSECOND
     u_delay = sheet.u_delay_us * MICROSECOND
@@ -310,9 +374,9 @@ def _temperatures(shots: SoundShots, sheet: AcousticSheet, model: str, air_model
     )
     station = StationAir(
         pressure_hpa=shots.weather[1],
-        u_pressure_hpa=sheet.u_pressure_hpa,
+        u_pressure_hpa=u_weather[0],
         humidity_percent=shots.weather[2],
-        u_humidity_percent=sheet.u_humidity_percent,
+        u_humidity_percent=u_weather[1],
         co2_ppm=sheet.co2_ppm,
     )
     wind = PathWind(

@@ -69,31 +69,6 @@ def group_index(
     return -TWO_PI * turns / phase_slope(path_length, modulation_hz=modulation_hz)
 
 
-def relative_group_index(
-    phase: ArrayLike,
-    *,
-    phase_0: ArrayLike,
-    index_0: ArrayLike,
-    path_length: ArrayLike,
-    modulation_hz: float = MODULATION_HZ,
-) -> NDArray[np.float64]:
-    """Group index along a calibrated path, from the phase change.
-
-    phase           rad, unwrapped from phase_0
-    phase_0         rad, phase at the calibration
-    index_0         group index at the calibration
-    path_length     m, above 0: D - D0; 25 mm of 100 m is good enough, see `length_sensitivity`
-    modulation_hz   Hz, above 0
-
-    Source: [PARKER04] eqs. 1.35, 1.36 with the sign of 5.18 (1.36 prints plus). Exact while the path keeps its length.
-
-    >>> round((float(relative_group_index(1.1, phase_0=1.0, index_0=1.00025, path_length=100.0)) - 1.0) * 1e6, 3)
-    234.096
-    """
-    moved = np.asarray(phase, dtype=float) - np.asarray(phase_0, dtype=float)
-    return np.asarray(index_0, dtype=float) + moved / phase_slope(path_length, modulation_hz=modulation_hz)
-
-
 def length_sensitivity(
     phase_change: ArrayLike, *, path_length: ArrayLike, modulation_hz: float = MODULATION_HZ
 ) -> NDArray[np.float64]:
@@ -228,11 +203,11 @@ def benchmark_refractometers(reduction: "Reduction") -> tuple[BenchmarkSeries, .
     """
     ranges = reduction.coordinates.ranges
     ends = list(zip(ranges.ranger, ranges.target, strict=True))
-    series = []
+    points, series = set(reduction.coordinates.points), []
     field = AirField.of(reduction.campaign, reduction.settings)
     for benchmark in reduction.campaign.benchmarks:
         rows = [row for row, pair in enumerate(ends) if pair == (benchmark.ranger, benchmark.target)]
-        if rows:
+        if rows and {benchmark.ranger, benchmark.target} <= points:
             times = reduction.campaign.shots.mjd_utc[ranges.shot[rows]]
             series.append(_series(reduction, field, benchmark, np.array(rows)[np.argsort(times, kind="stable")]))
     return tuple(series)
@@ -241,8 +216,10 @@ def benchmark_refractometers(reduction: "Reduction") -> tuple[BenchmarkSeries, .
 def _series(reduction: "Reduction", field: AirField, benchmark: "BenchmarkRow", rows: np.ndarray) -> BenchmarkSeries:
     campaign, coordinates = reduction.campaign, reduction.coordinates
     ranges, shots = coordinates.ranges, coordinates.ranges.shot[rows]
-    sheet, electronics = campaign.mirror_of(benchmark.ranger), reduction.electronics[benchmark.ranger]
-    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
+    electronics, half = reduction.electronics[benchmark.ranger], campaign.half_wavelengths(shots)
+    modulations = campaign.modulation_of(shots).tolist()
+    sheet = campaign.mirror_of(benchmark.ranger)
+    u_volt = np.array([sheet.at_modulation(hz).u_leakage_volt for hz in modulations])
     certified = benchmark.certified_distance_mm * MILLIMETRE
     constants = ranges.glass[rows] + ranges.obliquity[rows] + ranges.head[rows] + sheet.d0_mm * MILLIMETRE
     path = unwrapped_length(ranges.cycles[rows], ranges.phase[rows], half) / (certified - constants) - 1.0
@@ -250,9 +227,9 @@ def _series(reduction: "Reduction", field: AirField, benchmark: "BenchmarkRow", 
     at = np.searchsorted(electronics.shots, shots)
     per_metre = half / TWO_PI / certified  # refractivity per radian
     leakage_slope = np.abs(1.0 / reduction.phases.phasor[shots] - 1.0 / electronics.reference[at])
-    leakage = per_metre * sheet.u_leakage_volt * leakage_slope
+    leakage = per_metre * u_volt * leakage_slope
     noise = np.diag(reduction.phases.u_phase[shots] ** 2) + electronics.joint(at)
-    noise = per_metre**2 * noise
+    noise = np.outer(per_metre, per_metre) * noise
     u_length = np.hypot(benchmark.u_mm, sheet.u_d0_mm) * MILLIMETRE / certified
     u_common = float(np.hypot(u_length, leakage.mean()))
     u_path = np.sqrt(np.diag(noise) + leakage**2 + u_length**2)

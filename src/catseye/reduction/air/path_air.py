@@ -113,7 +113,7 @@ def site_air(
         readings, ground=ground, temperature=of.temperature, pressure=of.pressure, humidity=of.humidity
     )
     names = tuple(station.name for station in site.weather_station)
-    notes = _notes(profile, names, start)
+    notes = profile_notes(profile, names, start)
     return SiteAir(
         profile=profile,
         stations=names,
@@ -163,7 +163,8 @@ def _block(readings: WeatherReadings) -> float:
     return float(np.ptp(readings.seconds)) * len(np.unique(readings.station)) / (MOST_READINGS - 100)
 
 
-def _notes(profile: AirProfile, names: tuple[str, ...], start_mjd: float) -> tuple[str, ...]:
+def profile_notes(profile: AirProfile, names: tuple[str, ...], start_mjd: float) -> tuple[str, ...]:
+    """Notes on outlying readings and biased stations of a profile, one line each."""
     notes = []
     for field, unit in FIELDS:
         of_field = getattr(profile, field)

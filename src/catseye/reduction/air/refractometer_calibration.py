@@ -18,7 +18,7 @@ from catseye.atmosphere.index.air import MODELS, group_refractivity
 from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
 from catseye.records.site.validity import expired
-from catseye.reduction.air.group_index import AbsoluteIndex, absolute_group_index
+from catseye.reduction.air.group_index import AbsoluteIndex, absolute_group_index, length_sensitivity, phase_slope
 from catseye.reduction.air.refractometer_fit import PathFit, drift_name
 from catseye.reduction.air.refractometer_night import (
     FEWEST_AFTER_JUMP,
@@ -114,6 +114,20 @@ class PathCalibration:
     path_length: float
     u_path_length: float
     notes: tuple[str, ...]
+
+    @property
+    def length_sensitivity(self) -> float:
+        """Change of the index per metre of error in the path's length, 1/m, at the reading farthest from index_0.
+
+        Source: [PARKER04] eqs. 1.37 to 1.39, with the path's own largest change of phase.
+        """
+        sheet, moved = self.readings.sheet, self.refractivity - self.index_0
+        known = moved[np.isfinite(moved)]
+        if not len(known):
+            return float("nan")
+        farthest = float(known[np.argmax(np.abs(known))])
+        phase = farthest * float(phase_slope(sheet.path_length_m, modulation_hz=sheet.modulation_hz))
+        return float(length_sensitivity(phase, path_length=sheet.path_length_m, modulation_hz=sheet.modulation_hz))
 
     @property
     def verdict(self) -> Verdict:

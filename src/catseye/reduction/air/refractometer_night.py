@@ -25,11 +25,12 @@ from catseye.records.files.reading import Folder
 from catseye.records.files.record import EARLIEST_MJD, LATEST_MJD, Certificate, Version, Within
 from catseye.records.files.refusal import explained, refusal, shown
 from catseye.reduction.air.group_index import phase_slope
+from catseye.reduction.air.path_instruments import COLUMNS, path_humidity, path_pressure, refuse_columns
 
 THERMOMETERS = ("temperature_c", *(f"temperature_{k}_c" for k in range(1, 10)))
 WEATHER = ("pressure_hpa", "humidity_percent")
-REQUIRED = ("mjd_utc", "phase_rad", *WEATHER)
-OPTIONAL = (*THERMOMETERS, "u_phase_rad", "amplitude_v", "left_out")
+REQUIRED = ("mjd_utc", "phase_rad")
+OPTIONAL = (*COLUMNS, *THERMOMETERS, "u_phase_rad", "amplitude_v", "left_out")
 
 SIGMAS = 5.0  # standard uncertainties allowed between step and prediction, or within a quarter cycle
 FEWEST_AFTER_JUMP = 5  # consistent readings that make a step a jump of the path, not an outlier
@@ -57,6 +58,8 @@ class PathSheet(Certificate):
     u_temperature_c                      of each thermometer's offset, common to all its readings; a list has one
                                          per thermometer
     u_pressure_hpa, u_humidity_percent   of the sensor's offset, likewise
+    u_wet_bulb_c, u_dew_point_c          of such an instrument's offset, in place of u_humidity_percent
+    gravity_m_per_s2                     at a mercury barometer
     noise_temperature_c, noise_pressure_hpa, noise_humidity_percent  scatter of a reading about the path's mean
     u_phase_rad                          of a phase, if the table has no column of that name
     drift_mrad_per_root_hour             random walk of the electronics or the path; 0: none
@@ -73,6 +76,9 @@ class PathSheet(Certificate):
     u_temperature_c: Spread | Annotated[tuple[Spread, ...], Field(strict=False, min_length=1)] = 0.3
     u_pressure_hpa: Spread = 0.3
     u_humidity_percent: Spread = 3.0
+    u_wet_bulb_c: Spread = 0.2
+    u_dew_point_c: Spread = 0.4
+    gravity_m_per_s2: Annotated[float, Within(9.7, 9.9)] | None = None
     noise_temperature_c: Spread = 0.1
     noise_pressure_hpa: Spread = 0.05
     noise_humidity_percent: Spread = 0.5
@@ -164,7 +170,9 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
     folder, file = Folder(path.parent), path.name
     table = columns_of(folder.text(file), str(path), REQUIRED, optional=OPTIONAL)
     if sheet is None:
-        raise refusal(str(path), f"has no sheet {path.with_suffix('.toml').name} beside it and there is no path length")
+        text = f"has no sheet {path.with_suffix('.toml').name} beside it and there is no path length"
+        raise refusal(str(path), f"{text} (expected the sheet, or path_length_m, in the command --path-length-m)")
+    refuse_columns(table)
     if sheet.air_model not in MODELS:
         raise InputError(f"air_model = {shown(sheet.air_model)} is unknown (expected one of {', '.join(MODELS)})")
     named = tuple(name for name in THERMOMETERS if name in table.cells)
@@ -181,8 +189,13 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
     phase = table.numbers("phase_rad")
     table.check("phase_rad", np.abs(phase) <= 1e6, "radians, -1e6 to 1e6")
     limits = MODELS[sheet.air_model].limits
-    weather = {name: _limited(table, name, limits[name]) for name in WEATHER}
     temperature = np.stack([_limited(table, name, limits["temperature_c"]) for name in named], axis=1)
+    for name in WEATHER:
+        if name in table.cells:
+            _limited(table, name, limits[name])
+    pressure = path_pressure(table, sheet.gravity_m_per_s2, path.with_suffix(".toml").name)
+    moist = path_humidity(table, _mean_of_read(temperature), pressure, sheet.air_model)
+    sheet = _with_hygrometer(sheet, table, moist.per_unit)
     if "u_phase_rad" in table.cells:
         u_phase = table.numbers("u_phase_rad")
         table.check("u_phase_rad", (u_phase > 0.0) & (u_phase <= 1.0), "above 0 to 1 rad")
@@ -197,8 +210,8 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
         phase=phase,
         u_phase=u_phase,
         temperature_c=temperature,
-        pressure_hpa=weather["pressure_hpa"],
-        humidity_percent=weather["humidity_percent"],
+        pressure_hpa=pressure,
+        humidity_percent=moist.percent,
         thermometers=named,
         u_temperature_c=np.broadcast_to(np.array(u_columns), len(named)).astype(float),
         left_out=tuple(table.cells.get("left_out", [""] * len(table))),
@@ -209,6 +222,23 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
     if serving.sum() < FEWEST_AFTER_JUMP:
         raise refusal(str(path), f"holds {serving.sum()} readings with weather (expected at least {FEWEST_AFTER_JUMP})")
     return readings
+
+
+def _mean_of_read(temperature: np.ndarray) -> np.ndarray:
+    """Mean (m,) of the thermometers that were read; nan where none was."""
+    measured = np.isfinite(temperature)
+    count = measured.sum(axis=1)
+    total = np.where(measured, temperature, 0.0).sum(axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _with_hygrometer(sheet: PathSheet, table: TextColumns, per_unit: np.ndarray) -> PathSheet:
+    """Sheet whose u_humidity_percent is that of the table's psychrometer or mirror, at the median reading."""
+    for kind in ("wet_bulb_c", "dew_point_c"):
+        if kind in table.cells and np.isfinite(per_unit).any():
+            u = min(100.0, float(getattr(sheet, f"u_{kind}") * np.nanmedian(np.abs(per_unit))))
+            return sheet.model_copy(update={"u_humidity_percent": u})
+    return sheet
 
 
 def _limited(table: TextColumns, name: str, limit) -> np.ndarray:

@@ -21,10 +21,17 @@ from catseye.errors import ArgumentError
 from catseye.names import AIR_MODEL
 
 Hygrometer = Literal[
-    "humidity_percent", "dew_point_c", "frost_point_c", "wet_bulb_c", "ice_bulb_c", "vapour_pressure_hpa"
+    "humidity_percent",
+    "humidity_over_ice_percent",
+    "dew_point_c",
+    "frost_point_c",
+    "wet_bulb_c",
+    "ice_bulb_c",
+    "vapour_pressure_hpa",
 ]
 HYGROMETERS: tuple[Hygrometer, ...] = (
     "humidity_percent",
+    "humidity_over_ice_percent",
     "dew_point_c",
     "frost_point_c",
     "wet_bulb_c",
@@ -34,7 +41,7 @@ HYGROMETERS: tuple[Hygrometer, ...] = (
 PRESSURES = ("pressure_hpa", "barometer_mmhg")
 ABOVE = ValidInterval("height above the barometer", "m", -1000.0, 1000.0, "air of one temperature")
 UNCERTAINTY_OF: Mapping[str, tuple[Hygrometer, ...]] = {  # argument -> readings whose uncertainty it is
-    "u_humidity_percent": ("humidity_percent",),
+    "u_humidity_percent": ("humidity_percent", "humidity_over_ice_percent"),
     "u_dew_point_c": ("dew_point_c", "frost_point_c"),
     "u_wet_bulb_c": ("wet_bulb_c", "ice_bulb_c"),
     "u_vapour_pressure_hpa": ("vapour_pressure_hpa",),
@@ -47,8 +54,8 @@ U_LAPSE = 0.0065  # °C/m, of air taken as isothermal: the standard air's lapse
 class Moisture:
     """Reading of an instrument of humidity.
 
-    kind    relative humidity over liquid water (%), dew or frost point of a mirror (°C), wet bulb over water or over
-            ice (°C), or the vapour pressure itself (hPa)
+    kind    relative humidity over liquid water or over ice (%), dew or frost point of a mirror (°C), wet bulb over
+            water or over ice (°C), or the vapour pressure itself (hPa)
     value   in that unit
     u       its standard uncertainty, the same unit
     """
@@ -84,6 +91,24 @@ def moisture_of(readings: Mapping[Hygrometer, ArrayLike | None], uncertainties: 
 
 
 @dataclass(frozen=True)
+class MercuryColumn:
+    """Reading of a mercury barometer with its corrections.
+
+    corrected_mmhg   reading reduced to 0 °C, [PARKER04] eq. 1.8
+    gravity          at the barometer, m/s²
+    u_gravity        its standard uncertainty; 0 where it was measured
+    of               origin of the gravity, as text
+    anomaly          measured gravity less that of the formula at this latitude, m/s²; None: no station, or no latitude
+    """
+
+    corrected_mmhg: ArrayLike
+    gravity: ArrayLike
+    u_gravity: float
+    of: str
+    anomaly: ArrayLike | None = None
+
+
+@dataclass(frozen=True)
 class Pressure:
     """Pressure at the barometer, hPa.
 
@@ -91,12 +116,16 @@ class Pressure:
     u           its standard uncertainty
     u_formula   part of it that exact readings leave
     stated      True: the uncertainty of a reading is known
+    doubts      on what it was computed from, a sentence each
+    mercury     corrections of a mercury barometer; None: another instrument
     """
 
     value: ArrayLike
     u: ArrayLike = 0.0
     u_formula: ArrayLike = 0.0
     stated: bool = False
+    doubts: tuple[str, ...] = ()
+    mercury: MercuryColumn | None = None
 
 
 def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
@@ -105,6 +134,7 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
     *,
     mercury_c: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
+    gravity_station: str | None = None,
     latitude_deg: ArrayLike | None = None,
     elevation_m: ArrayLike | None = None,
     u_pressure_hpa: ArrayLike = 0.0,
@@ -115,11 +145,13 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
 
     pressure_hpa                 total pressure, hPa; or None and
     barometer_mmhg, mercury_c    mercury as read, mm, and its temperature, °C, with
-    gravity                      m/s², or None and both of
+    gravity                      m/s², or
+    gravity_station              name of a station with measured gravity; elevation_m carries it there through free air,
+                                 within 50 m, and latitude_deg gives its anomaly; or both of
     latitude_deg, elevation_m    degrees, m above the sea
     u_...                        standard uncertainties
 
-    Raises ArgumentError: arguments that do not fit together.
+    Raises ArgumentError: arguments that do not fit together; ValidityError: a station that is unknown or too far.
     """
     if (pressure_hpa is None) == (barometer_mmhg is None):
         raise ArgumentError("pressure: give pressure_hpa or barometer_mmhg, not both", "pressure_hpa", "barometer_mmhg")
@@ -128,6 +160,7 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
     of_mercury = {
         "mercury_c": mercury_c,
         "gravity": gravity,
+        "gravity_station": gravity_station,
         "latitude_deg": latitude_deg,
         "elevation_m": elevation_m,
     }
@@ -140,17 +173,78 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
                 raise ArgumentError(f"{name} belongs to barometer_mmhg, not to pressure_hpa", name, *PRESSURES)
         assert pressure_hpa is not None
         return Pressure(pressure_hpa, u_pressure_hpa, stated=stated)
-    place = [latitude_deg is not None, elevation_m is not None]
-    if mercury_c is None or not (all(place) if gravity is None else not any(place)):
+    if mercury_c is None or not _gravity_is_one(gravity, gravity_station, latitude_deg, elevation_m):
         raise ArgumentError(
-            "barometer_mmhg needs mercury_c, and gravity or both latitude_deg and elevation_m", *of_mercury, *PRESSURES
+            "barometer_mmhg needs mercury_c, and one of gravity, gravity_station, or both latitude_deg and elevation_m",
+            *of_mercury,
+            *PRESSURES,
         )
     latitude = None if latitude_deg is None else np.radians(latitude_deg)
-    where: dict[str, Any] = {"gravity": gravity, "latitude": latitude, "elevation": elevation_m}
+    corrections = _corrections(barometer_mmhg, mercury_c, gravity, gravity_station, latitude, elevation_m)
+    where: dict[str, Any] = {"gravity": corrections.gravity}
+    if gravity is None and gravity_station is None:
+        where = {"latitude": latitude, "elevation": elevation_m}
     read_so = {"u_reading_mmhg": u_barometer_mmhg, "u_mercury_c": u_mercury_c}
     value, u = station_pressure(barometer_mmhg, mercury_c, **where, **read_so)
     u_formula = station_pressure(barometer_mmhg, mercury_c, **where)[1]
-    return Pressure(value, np.hypot(u_pressure_hpa, u), u_formula, stated)
+    return Pressure(
+        value=value,
+        u=np.hypot(u_pressure_hpa, u),
+        u_formula=u_formula,
+        stated=stated,
+        doubts=latitude_doubts(latitude_deg),
+        mercury=corrections,
+    )
+
+
+def _gravity_is_one(
+    gravity: ArrayLike | None, station: str | None, latitude_deg: ArrayLike | None, elevation_m: ArrayLike | None
+) -> bool:
+    """True if exactly one source of the gravity is complete."""
+    place = [latitude_deg is not None, elevation_m is not None]
+    if gravity is not None:
+        return station is None and not any(place)
+    return station is not None or all(place)
+
+
+def _corrections(
+    reading_mmhg: ArrayLike,
+    mercury_c: ArrayLike,
+    gravity: ArrayLike | None,
+    station_name: str | None,
+    latitude: ArrayLike | None,
+    elevation: ArrayLike | None,
+) -> MercuryColumn:
+    corrected = barometer.temperature_corrected_mmhg(reading_mmhg, mercury_c)
+    if gravity is not None:
+        return MercuryColumn(corrected, gravity, 0.0, "as given")
+    if station_name is None:
+        normal = barometer.normal_gravity(latitude, elevation)
+        return MercuryColumn(corrected, normal, barometer.U_NORMAL_GRAVITY, "latitude and elevation")
+    station = barometer.gravity_station(station_name)
+    there = station.gravity if elevation is None else station.gravity_at(elevation)
+    anomaly = None if latitude is None else station.anomaly(latitude)
+    return MercuryColumn(corrected, there, 0.0, f"station {station.name}, {station.where}", anomaly)
+
+
+def latitude_doubts(latitude_deg: ArrayLike | None) -> tuple[str, ...]:
+    """Doubt on a latitude that is likely in radians; empty if not.
+
+    latitude_deg   degrees; None: none
+
+    >>> latitude_doubts(38.43), latitude_doubts(None)
+    ((), ())
+    >>> latitude_doubts(0.6708)[0][48:82]
+    'as radians it is 38.43 degrees; at'
+    """
+    values = np.ravel(np.asarray(0.0 if latitude_deg is None else latitude_deg, dtype=float))
+    if not np.any(values) or np.any(np.abs(values) > np.pi / 2.0):
+        return ()
+    first = float(values[np.flatnonzero(values)[0]])
+    return (
+        f"a latitude of {first:g} degrees is at the equator; as radians it is {np.degrees(first):.4g} degrees; at the "
+        "equator give the gravity instead",
+    )
 
 
 @dataclass(frozen=True)
@@ -341,6 +435,8 @@ def read(
     formula = MODELS[model].vapour_formula if model in MODELS else "buck"
     if moisture.kind == "humidity_percent":
         return hygrometer.of_relative_humidity(temperature_c, pressure_hpa, moisture.value, formula=formula)
+    if moisture.kind == "humidity_over_ice_percent":
+        return hygrometer.of_relative_humidity(temperature_c, pressure_hpa, moisture.value, over_ice=True)
     if moisture.kind == "dew_point_c":
         return hygrometer.of_mirror(moisture.value, pressure_hpa, formula, deposit="dew")
     if moisture.kind == "frost_point_c":

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from catseye.atmosphere.weather.humidity import humidity_doubts
+from catseye.names import counted
 from catseye.records.night.recording import AcousticSheet
 from catseye.records.site.validity import expired
 from catseye.reduction.air.acoustic import USED, PathTemperatures
@@ -80,6 +81,9 @@ class AcousticPath:
     model         formula of the speed of sound
     air_model     formula of the index
     hashes        SHA-256 of each file read
+    weather_of    source of pressure and humidity
+    u_weather     standard uncertainties of pressure, hPa, and humidity, %
+    doubts        on the weather
     """
 
     sheet: AcousticSheet
@@ -89,6 +93,9 @@ class AcousticPath:
     model: str
     air_model: str
     hashes: dict[str, str]
+    weather_of: str
+    u_weather: tuple[float, float]
+    doubts: tuple[str, ...] = ()
 
     @property
     def used(self) -> np.ndarray:
@@ -131,7 +138,7 @@ class AcousticReduction:
         for path in self.paths:
             ends = f"{path.sheet.ranger} to {path.sheet.target}"
             doubts += expired({ends: path.sheet}, float(path.shots.mjd[-1]))
-            doubts += humidity_doubts(path.shots.weather[2])
+            doubts += (*path.doubts, *humidity_doubts(path.shots.weather[2]))
         return _use_of_shots(self.paths).hearing(doubts)
 
     @property
@@ -156,4 +163,5 @@ def _use_of_shots(paths: Sequence[AcousticPath]) -> Verdict:
     if thin:
         share = 100.0 * float(thin[0].used.mean())
         return Verdict("doubtful", f"only {share:.0f} % of the shots of {thin[0].sheet.ranger} could be used")
-    return Verdict("good", f"{sum(int(path.used.sum()) for path in paths)} shots used of {len(paths)} paths")
+    shots = counted(sum(int(path.used.sum()) for path in paths), "shot")
+    return Verdict("good", f"{shots} used of {counted(len(paths), 'path')}")

@@ -17,15 +17,16 @@ def stated_inputs(**u: ArrayLike) -> tuple[str, ...]:
     return tuple(name for name, value in u.items() if np.any(np.asarray(value, dtype=float) > 0.0))
 
 
-def contributions(stated: Sequence[str]) -> str:
+def contributions(stated: Sequence[str], inputs: Sequence[str] = WEATHER) -> str:
     """Contributions that an uncertainty includes, as text.
 
     stated   of `stated_inputs`
+    inputs   that a complete uncertainty has
 
     >>> contributions(("temperature",))
     'includes the formula and temperature; not given: pressure, humidity'
     """
-    missing = [name for name in WEATHER if name not in stated]
+    missing = [name for name in inputs if name not in stated]
     if not stated:
         return "that of the formula only; those of the sensors are not given"
     if not missing:
@@ -33,12 +34,13 @@ def contributions(stated: Sequence[str]) -> str:
     return f"includes the formula and {', '.join(stated)}; not given: {', '.join(missing)}"
 
 
-def uncertainty_words(stated: Sequence[str]) -> str:
+def uncertainty_words(stated: Sequence[str], inputs: Sequence[str] = WEATHER) -> str:
     """Sentence on the contributions that an uncertainty includes.
 
     stated   of `stated_inputs`
+    inputs   that a complete uncertainty has
 
     >>> uncertainty_words(())
     'u is that of the formula only; those of the sensors are not given'
     """
-    return f"u {'' if stated else 'is '}{contributions(stated)}"
+    return f"u {'' if stated else 'is '}{contributions(stated, inputs)}"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from catseye.simulator.laboratory.refractometer import D0, PathPlan, simulate_path_night
+from reduction.air.refractometer_scene import D0, PathPlan, simulate_path_night
 
 STILL = PathPlan(phase_noise=0.0, walk_mrad_per_root_hour=0.0, hours=1.0, patch_c=0.0)
 
