@@ -17,8 +17,9 @@ from catseye.constants import ARCSECOND, DEGREE
 from catseye.gateways.optics.retroreflector_figures import Dimensions, aberration_plot, return_plot
 from catseye.optics.glass import group_index, index_over_air
 from catseye.optics.ray_trace import Plane, beam, corner, half_path, through_prism
-from catseye.optics.retroreflector import dihedral, prism
+from catseye.optics.retroreflector import prism
 from catseye.optics.retroreflector.cats_eye import focal_radius
+from catseye.optics.retroreflector.dihedral import on_axis_share, pupil_offset
 from catseye.optics.retroreflector.kinds.ball import silvered
 
 HEIGHT, APERTURE = 0.0381, 0.0254  # m
@@ -102,9 +103,9 @@ def main(directory: Path) -> None:
     face = {"aperture": APERTURE, "beam_radius": 0.010}
     say(
         f"3 arcsec of deviation: far-field share on the axis "
-        f"{dihedral.on_axis_share(three, **face, wavelength=0.78e-6):.3f}, "
+        f"{on_axis_share(three, **face, wavelength=0.78e-6):.3f}, "
         f"{three * 100.0 * 1e3:.2f} mm aside at 100 m, "
-        f"{dihedral.pupil_offset(three, **face) * 1e6:.3f} µm without a lens, "
+        f"{pupil_offset(three, **face) * 1e6:.3f} µm without a lens, "
         f"{0.25 * 100.0 * three**2 * 1e9:.0f} nm with one, at 100 m"
     )
     directory.mkdir(parents=True, exist_ok=True)

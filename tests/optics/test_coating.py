@@ -14,7 +14,6 @@ from catseye.optics.coating import (
     index,
     named,
     quarter_wave,
-    quarter_wave_group_path,
     quarter_wave_mirror,
     response,
 )
@@ -102,18 +101,27 @@ def test_a_quarter_wave_of_the_root_of_the_glass_reflects_nothing():
     assert (plain, coated) == pytest.approx((0.0414, 0.0125), abs=3e-4)  # of the trade: 4.2 % and 1.3 %
 
 
+def endless_mirror(wavelength, high, low):
+    """Group path, m, of endless quarter waves at the centre of their band, from the phase and group index of each.
+
+    Each layer turned by e = (pi/2)(n_g/n)(dw/w) off a quarter wave maps the impedance z in front to
+    z L^2/H^2 + i e_H/H + i e_L L/H^2; its fixed point in r = -(1 - 2 z), the high index H outside. Babic and Corzine
+    (1992) have it without dispersion.
+    """
+    (n_h, g_h), (n_l, g_l) = high, low
+    return 0.5 * wavelength * (g_h + g_l) / (n_h**2 - n_l**2)
+
+
 def test_a_many_layered_mirror_delays_as_the_closed_form_says():
     plain = group_path(quarter_wave_mirror(25, high=2.1143, low=1.4537), 0.780)
-    assert plain == pytest.approx(
-        float(quarter_wave_group_path(0.78e-6, high=(2.1143,) * 2, low=(1.4537,) * 2)), rel=1e-6
-    )
+    assert plain == pytest.approx(endless_mirror(0.78e-6, (2.1143,) * 2, (1.4537,) * 2), rel=1e-6)
     step = 1e-4
     slope = float((index("Ta2O5", 0.78 + step) - index("Ta2O5", 0.78 - step)).real) / (2.0 * step)
     n_h = float(index("Ta2O5", 0.78).real)
     high = (n_h, n_h - 0.78 * slope)
     low = (float(phase_index(0.78, "fused-silica")), float(group_index(0.78, "fused-silica")))
     dispersive = group_path(quarter_wave_mirror(25), 0.780)
-    assert dispersive == pytest.approx(float(quarter_wave_group_path(0.78e-6, high=high, low=low)), rel=1e-5)
+    assert dispersive == pytest.approx(endless_mirror(0.78e-6, high, low), rel=1e-5)
     assert dispersive == pytest.approx(0.61e-6, abs=0.01e-6)
 
 

@@ -11,7 +11,6 @@ from catseye.optics.isolator import (
     back_share,
     faraday_turn,
     forward_share,
-    isolation_db,
     jones_back,
     jones_out,
 )
@@ -37,7 +36,7 @@ def test_no_polarization_comes_back_stronger_than_the_worst(turn, second, leak, 
 
 def test_a_rotator_that_worked_alike_both_ways_would_isolate_nothing():
     made = Isolator(leak=0.0, transmission=1.0)
-    assert isolation_db(made, [1.0, 1.0]) > 200.0
+    assert back_share(made, [1.0, 1.0]) < 1e-20
     reciprocal = jones_out(made).T  # what light retracing its way through passive glass meets
     assert np.sum((reciprocal @ np.sqrt([0.5, 0.5])) ** 2) == pytest.approx(1.0)
     assert np.sum((jones_back(made) @ np.sqrt([0.5, 0.5])) ** 2) == pytest.approx(0.0, abs=1e-20)
@@ -52,8 +51,9 @@ def test_light_across_comes_back_by_the_leak_of_the_second_polarizer():
 def test_ten_degrees_of_warmth_leave_32_db():
     warm = Isolator(turn=float(faraday_turn(0.78, 30.0)), leak=0.0, transmission=1.0)
     missed = np.pi / 4.0 * (1.0 - 293.15 / 303.15)
-    assert isolation_db(warm, [1.0, 1.0]) == pytest.approx(-20.0 * np.log10(np.sin(missed)), abs=1e-6)
-    assert isolation_db(warm, [1.0, 1.0]) == pytest.approx(31.7, abs=0.1)
+    isolation_db = -10.0 * np.log10(back_share(warm, [1.0, 1.0]))
+    assert isolation_db == pytest.approx(-20.0 * np.log10(np.sin(missed)), abs=1e-6)
+    assert isolation_db == pytest.approx(31.7, abs=0.1)
     assert np.degrees(faraday_turn(0.79)) < 45.0 < np.degrees(faraday_turn(0.77))
 
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
+
 from catseye.aliases import Progress
 from catseye.api.reading import place_of
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
-from catseye.constants import DEGREE, MILLIMETRE
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import ArgumentError
 from catseye.reduction.optics.link import Link, LinkReflector
 
@@ -83,6 +85,7 @@ def glass(
     wavelength_um: Annotated[Any, In("um", one=True)] = 0.780,
     temperature_c: Annotated[Any, In("deg_C", one=True)] = 20.0,
     height_mm: Annotated[Any, In("mm", one=True)] = 38.1,
+    plate_mm: Annotated[Any, In("mm", one=True)] = None,
 ) -> GlassResult:
     """Indices of a glass, a prism of it, and errors of another glass.
 
@@ -90,8 +93,10 @@ def glass(
     wavelength_um   in vacuum, µm
     temperature_c   of the glass, °C
     height_mm       of a prism at 20 °C, face to corner, mm
+    plate_mm        from the face of a mirror to the face of the prism in its back, mm; None: no mirror
 
-    Raises ValidityError: unknown glass, a value outside its formula; ArgumentError: no height of a prism.
+    Raises ValidityError: unknown glass, a value outside its formula; ArgumentError: no height of a prism, no plate,
+    or a plate without a glass. Source: [PARKER04] section 2.4 for the cube in the back of a mirror.
 
     >>> round(float(glass("BK7-old", height_mm=38.4).values["notes_group_index"]), 8)
     1.52746375
@@ -101,8 +106,12 @@ def glass(
 
     if name is None:
         require_height(height_mm)
+        if plate_mm is not None:
+            raise ArgumentError(
+                "plate_mm is that of a prism of one glass (expected the name of a glass, too)", "plate_mm"
+            )
         return GlassResult(ALL_GLASSES, None, table_object())
-    state = glass_state(name, wavelength_um, temperature_c, height_mm=height_mm)
+    state = glass_state(name, wavelength_um, temperature_c, height_mm=height_mm, plate_mm=plate_mm)
     return GlassResult(state.verdict, name, glass_object(state))
 
 
@@ -143,6 +152,9 @@ class LinkResult(Result):
         for name, share in sorted(b.noise_shares.items(), key=lambda item: -item[1]):
             yield f"{'':<4}{name:<28}{100 * share:10.3g} %"
         yield f"{'crosstalk left, at worst':<32}{b.crosstalk_range * 1e6:10.4g} µm"
+        if b.deviation:
+            yield f"{'deviation by dihedral errors':<32}{b.deviation / ARCSECOND:10.4g} arc seconds at most"
+            yield f"{'their range error, no lens':<32}{b.pupil_offset * 1e6:+10.4g} µm"
 
     def to_object(self) -> dict[str, Any]:
         """JSON object of `catseye link --json`."""
@@ -160,6 +172,8 @@ class LinkResult(Result):
             "noise_shares": b.noise_shares,
             "volts_per_ampere": self.head.volts_per_ampere,
             "clipped": b.clipped,
+            "deviation": b.deviation,
+            "pupil_offset": b.pupil_offset,
         }
 
     def tables(self) -> "dict[str, QTable]":
@@ -184,6 +198,7 @@ def link(
     aperture_mm: Annotated[Any, In("mm", one=True)] = LinkReflector.aperture * 1e3,
     height_mm: Annotated[Any, In("mm", one=True)] = LinkReflector.height * 1e3,
     index: Annotated[Any, In("", one=True)] = LinkReflector.index,
+    dihedral_arcsec: Annotated[Any, In("arcsec")] = None,
     duration: Annotated[Any, In("s", one=True)] = Link.duration,
     blocked_noise_volt: Annotated[Any, In("V", one=True)] = Link.blocked_noise_volt,
     background_uw: Annotated[Any, In("uW", one=True)] = 0.0,
@@ -199,6 +214,7 @@ def link(
     receiver_mm          radius of the receiving lens, mm
     transmission         of the head's optics, out and back
     aperture_mm, height_mm, index   radius of the reflector's clear face, corner behind it, mm; 1 for a hollow cube
+    dihedral_arcsec      excess of its three angles over right ones, or one value for all, arc seconds; None: none
     duration             of one range, s
     blocked_noise_volt   rms of the samples with the beam blocked, V
     background_uw        daylight on the detector, µW
@@ -220,7 +236,16 @@ def link(
         duration=duration,
         blocked_noise_volt=blocked_noise_volt,
     )
-    reflector = LinkReflector(aperture=aperture_mm * MILLIMETRE, height=height_mm * MILLIMETRE, index=index)
+    errors = np.atleast_1d(np.asarray(0.0 if dihedral_arcsec is None else dihedral_arcsec, dtype=float))
+    if errors.shape not in ((1,), (3,)):
+        raise ArgumentError(f"dihedral_arcsec has {errors.size} values (expected one or three)", "dihedral_arcsec")
+    first, second, third = (float(value) * ARCSECOND for value in np.broadcast_to(errors, 3))
+    reflector = LinkReflector(
+        aperture=aperture_mm * MILLIMETRE,
+        height=height_mm * MILLIMETRE,
+        index=index,
+        dihedral=(first, second, third),
+    )
     if measured_volt is not None:
         head = head.scaled(link_budget(head, reflector, distance).amplitude_volt, measured_volt)
     light = {"incidence": incidence_deg * DEGREE, "background": background_uw * 1e-6}

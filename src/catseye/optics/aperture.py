@@ -31,23 +31,6 @@ def cos_incidence(x: ArrayLike, y: ArrayLike, focal_length: float) -> NDArray[np
     return 1.0 / np.sqrt(1.0 + (x * x + y * y) / (2.0 * focal_length) ** 2)
 
 
-def half_path(deviation: ArrayLike, x: ArrayLike, y: ArrayLike, *, focal_length: float) -> NDArray[np.float64]:
-    """Half of the shortening of the path to the focus, m.
-
-    By normal deviations.
-
-    deviation      m, along the normal, above zero towards the focus
-    x, y           m, from the axis
-    focal_length   m
-
-    Source: [BAARS07]; derived above. Good to deviation^2 / f.
-
-    >>> round(float(half_path(1e-3, 0.0, 120.0, focal_length=60.0)) * 1e3, 6)
-    0.707107
-    """
-    return np.asarray(deviation, dtype=float) * cos_incidence(x, y, focal_length)
-
-
 def taper(rho: ArrayLike, edge_db: float) -> NDArray[np.float64]:
     """Amplitude of a Gaussian illumination over that at the centre.
 

@@ -8,6 +8,8 @@ of the tangential electric field, so that s and p are alike at normal incidence.
 A range depends not on the phase on reflection but on its slope by frequency, the delay of the modulation: below a
 tenth of a micrometre for a bare metal, 0.3 to 1 um for a quarter-wave mirror, more at the edge of its band. Mirror
 surfaces are surveyed on the outer face of the coating, which is the reference here.
+
+Source: [PARKER04] chapter 6, item 6, section 6.2.2.
 """
 
 from collections.abc import Mapping, Sequence
@@ -259,34 +261,6 @@ def quarter_wave_mirror(
     """
     h, el = (quarter_wave(m, wavelength_um, incidence) for m in (high, low))
     return Coating((h, el) * pairs + (h,), substrate)
-
-
-def quarter_wave_group_path(
-    wavelength: ArrayLike,
-    *,
-    high: tuple[float, float],
-    low: tuple[float, float],
-    medium: float = 1.0,
-) -> Array:
-    """Path, m, of an endless quarter-wave mirror at its band centre.
-
-    At normal incidence.
-
-    wavelength   m
-    high, low    phase and group index of the layers; the high one is outside
-    medium       index in front
-
-    medium (wavelength/2) (n_gH + n_gL)/(n_H^2 - n_L^2); without dispersion medium (wavelength/2)/(n_H - n_L).
-
-    Source: derived here: each layer turned by the small angle e = (pi/2)(n_g/n)(dw/w) off a quarter wave maps the
-    impedance z in front to z L^2/H^2 + i e_H/H + i e_L L/H^2; its fixed point in r = -(1 - 2 n0 z). [BABIC92] has it
-    without dispersion.
-
-    >>> round(float(quarter_wave_group_path(0.78e-6, high=(2.1, 2.1), low=(1.45, 1.45))) * 1e6, 6)
-    0.6
-    """
-    (n_h, g_h), (n_l, g_l) = high, low
-    return 0.5 * medium * np.asarray(wavelength, dtype=float) * (g_h + g_l) / (n_h**2 - n_l**2)
 
 
 def named(coating: str, wavelength_um: float, incidence: float = 0.0) -> Coating:

@@ -12,6 +12,7 @@ Ranges are differences to the internal reference: only differences between the t
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -43,6 +44,10 @@ class Photodiode:
         for name in ("radius", "sheet_resistance", "capacitance"):
             if not 0.0 < getattr(self, name) < np.inf:
                 raise ValidityError(f"{name} {getattr(self, name)} of a photodiode is not above 0 and finite")
+
+    def lag(self, modulation_hz: float = 1500e6) -> float:
+        """Lag, rad, of the signal of the centre behind that of the rim."""
+        return -float(np.angle(place_response(0.0, self, modulation_hz)))
 
     @property
     def delay_per_area(self) -> float:
@@ -146,22 +151,42 @@ def spot_range_uncertainty(offset: ArrayLike, u_place: ArrayLike, diode: Photodi
     >>> round(float(spot_range_uncertainty(50e-6, 5e-6, diode)) * 1e6, 2)
     9.59
     """
-    d, u = np.asarray(offset, dtype=float), np.asarray(u_place, dtype=float)
-    return SPEED_OF_LIGHT * diode.delay_per_area * u * np.hypot(d, u)
+    delay = diode.delay_per_area * diode.radius**2
+    return 0.5 * SPEED_OF_LIGHT * image_lead(offset, u_place, lag=delay, radius=diode.radius).u
 
 
-def image_offset(angle: ArrayLike, focal_length: ArrayLike) -> Array:
-    """Image position, m, of light at an angle to the axis.
+class ImageLead(NamedTuple):
+    """Lead of signals whose image moves about a mean place, in the unit of the detector's lag.
 
-    It is smaller for short focal lengths.
-
-    angle          rad
-    focal_length   m
-
-    >>> round(float(image_offset(1e-4, 0.2)) * 1e6, 3)
-    20.0
+    mean   against an image at rest in the mean place; above zero: early, a range too short
+    u      standard deviation, of one image by itself
     """
-    return np.asarray(focal_length, dtype=float) * np.tan(np.asarray(angle, dtype=float))
+
+    mean: Array
+    u: Array
+
+
+def image_lead(offset: ArrayLike, u_place: ArrayLike, *, lag: ArrayLike, radius: ArrayLike) -> ImageLead:
+    """Mean and standard deviation (...) of the lead by an image's place on a detector.
+
+    offset    (...) m, of the mean place from the centre
+    u_place   (...) m, of each of the two coordinates of one image about it, independent
+    lag       of the centre behind the rim, rad (or s)
+    radius    m, above 0, of the disc
+
+    The signal of a place r is early by lag r^2/radius^2 against the centre's. With x and y about a mean place d away,
+    r^2 - d^2 = 2 d x + x^2 + y^2: its mean is 2 u^2, its variance 4 u^2 (d^2 + u^2).
+
+    Source: [PARKER04] chapter 6, item 2, names the effect; derived here from the closed form for small lags in
+    `spot_range`. Exact for normal scatter, with lags up to 0.1 rad good to 1 %.
+
+    >>> lead = image_lead(10e-6, 5e-6, lag=0.02, radius=0.1e-3)
+    >>> round(float(lead.mean) * 1e6, 3), round(float(lead.u) * 1e6, 3)  # 100 and 224 urad
+    (100.0, 223.607)
+    """
+    d, u = np.asarray(offset, dtype=float), np.asarray(u_place, dtype=float)
+    steep = np.asarray(lag, dtype=float) / np.asarray(radius, dtype=float) ** 2
+    return ImageLead(2.0 * steep * u**2, 2.0 * np.abs(steep) * u * np.hypot(d, u))
 
 
 def quadrant_signals(x: ArrayLike, y: ArrayLike, spot: float, gap: float = 0.0) -> Array:

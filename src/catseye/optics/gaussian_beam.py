@@ -2,6 +2,8 @@
 
 Scalar and paraxial. A retroreflector returns the light on its aperture, turned about its centre, with the same
 curvature: after it the light spreads by its divergence and by diffraction at the aperture.
+
+Source: [PARKER04] section 6.2.6.
 """
 
 from collections.abc import Sequence
@@ -130,33 +132,6 @@ def share_within_ellipse(aperture: ArrayLike, radius_x: ArrayLike, radius_y: Arr
     return np.minimum(np.sum(top * weight * light, axis=-1) * np.sqrt(2.0 / np.pi), 1.0)
 
 
-def imaged_waist(
-    distance: ArrayLike, *, focal_length: ArrayLike, waist: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0
-) -> tuple[NDArray, NDArray]:
-    """Distance, m, and radius, m, of the next waist after a thin lens.
-
-    distance       m, from the waist to the lens; below zero where the beam meets the lens before its waist
-    focal_length   m, not 0
-    waist          m, above 0
-    wavelength     m, above 0
-    quality        M^2, at least 1
-
-    A waist in the front focal plane goes to the back focal plane, the widest that there is; the farthest comes from a
-    Rayleigh range before or behind that place.
-
-    Source: [SELF83], the thin-lens formula for waists. Exact for a paraxial beam.
-
-    >>> [round(float(v), 9) for v in imaged_waist(1.0, focal_length=1.0, waist=1e-4, wavelength=0.78e-6)]
-    [1.0, 0.002482817]
-    """
-    _positive(waist=waist, wavelength=wavelength)
-    f, w = np.asarray(focal_length, float), np.asarray(waist, float)
-    rayleigh = np.pi * w**2 / (np.asarray(quality, float) * np.asarray(wavelength, float))
-    from_focus = np.asarray(distance, float) - f
-    shrunk = f**2 / (from_focus**2 + rayleigh**2)
-    return f + from_focus * shrunk, w * np.sqrt(shrunk)
-
-
 def waist_for(distance: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
     """Waist, m, at the head for the smallest beam at a distance.
 
@@ -173,24 +148,6 @@ def waist_for(distance: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1
     """
     _positive(distance=distance, wavelength=wavelength)
     return np.sqrt(np.asarray(quality, float) * np.asarray(wavelength, float) * np.asarray(distance, float) / np.pi)
-
-
-def farthest_waist(lens_radius: ArrayLike, wavelength: ArrayLike, quality: ArrayLike = 1.0) -> NDArray:
-    """Largest distance, m, of a waist for a given radius on the lens.
-
-    lens_radius   m, above 0: radius of the beam on the lens at 1/e^2
-    wavelength    m, above 0
-    quality       M^2, at least 1
-
-    At this distance the waist is the lens's radius over the root of 2.
-
-    Source: [SIEGMAN86] ch. 17, the maximum of the waist's distance for a given radius on the lens.
-
-    >>> round(float(farthest_waist(0.010, 0.78e-6)), 3)
-    201.384
-    """
-    _positive(lens_radius=lens_radius, wavelength=wavelength)
-    return 0.5 * np.pi * np.asarray(lens_radius, float) ** 2 / (np.asarray(quality, float) * np.asarray(wavelength))
 
 
 def powers_through(

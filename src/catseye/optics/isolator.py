@@ -128,18 +128,6 @@ def back_share(isolator: Isolator, returned: ArrayLike | None = None) -> float:
     return float(np.abs(row @ light) ** 2) / power
 
 
-def isolation_db(isolator: Isolator, returned: ArrayLike | None = None) -> float:
-    """Isolation, dB, with plain losses included.
-
-    isolator, returned   as for `back_share`
-
-    >>> round(isolation_db(Isolator()), 1)  # a leak of 1e-4 lets worst light through at 40 dB
-    40.4
-    """
-    share = back_share(isolator, returned)
-    return float(-10.0 * np.log10(share)) if share > 0.0 else float("inf")
-
-
 def _polarizer(angle: float, leak: float) -> Array:
     """Polarizer matrix; the crossed field passes with the root of the leak."""
     along = np.array([np.cos(angle), np.sin(angle)])

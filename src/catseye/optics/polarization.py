@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.aliases import Array
 from catseye.errors import ValidityError
-from catseye.optics.coating import Coating, response
 
 Complex = NDArray[np.complex128]
 Surface = Callable[[Array], tuple[Complex, Complex]]  # cosine of incidence -> r_s, r_p
@@ -62,30 +61,6 @@ def surface(*, inside: float, outside: complex) -> Surface:
     [-1.0, 1.0]
     """
     return lambda cosine: reflection(cosine, inside=inside, outside=outside)
-
-
-def coated(coating: Coating, wavelength_um: float, *, medium: float = 1.0) -> Surface:
-    """Surface under thin films, as a function of cosine of incidence.
-
-    coating         layers and substrate, from the side of the light
-    wavelength_um   um
-    medium          index in front: 1 for a hollow corner, that of the glass for a prism's metal
-
-    Source: `coating.response`, with the opposite sign of time and p equal to s at normal incidence.
-
-    >>> from catseye.optics.coating import named
-    >>> r_s, r_p = coated(named("gold", 0.780), 0.780)(np.array(1.0))
-    >>> round(float(abs(r_s) ** 2), 3), bool(abs(r_s + r_p) < 1e-12)
-    (0.975, True)
-    """
-
-    def mirror(cosine: Array) -> tuple[Complex, Complex]:
-        angle = np.arccos(np.minimum(cosine, 1.0))
-        s = response(coating, wavelength_um, angle, polarization="s", medium=medium).r
-        p = response(coating, wavelength_um, angle, polarization="p", medium=medium).r
-        return np.conj(s), -np.conj(p)
-
-    return mirror
 
 
 def total_reflection_retardance(cosine: ArrayLike, index: ArrayLike) -> Array:

@@ -205,15 +205,3 @@ def through_prism(
     for _ in range(3):
         inside = inside.reflected_in(faces, group)
     return inside.to(face, group).refracted(face, phase)
-
-
-def through_ball(rays: Rays, *, r1: float, r2: float, phase: float, group: float) -> Rays:
-    """Trace a cat's-eye about the origin: in by r1, back from r2, out by r1.
-
-    r1, r2         m
-    phase, group   index of the glass over that of the air
-    """
-    small, mirror = SphericalSurface((0.0, 0.0, 0.0), r1), SphericalSurface((0.0, 0.0, 0.0), r2, far=True)
-    inside = rays.to(small, 1.0).refracted(small, 1.0 / phase).to(mirror, group).reflected(mirror)
-    out = SphericalSurface((0.0, 0.0, 0.0), r1, far=True)
-    return inside.to(out, group).refracted(out, phase)

@@ -1,5 +1,7 @@
 """Receiver: signal, delay and noise from light on lens and photodiode."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -127,21 +129,40 @@ def lens_group_range(
     return 0.5 * lens_group_lag(np.sqrt(mean), powers, phase, group=group)
 
 
-def traced_lens(
-    heights: ArrayLike, *, r1: float, r2: float, thickness: float, phase: float, group: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Paths (r,), m, of wave and modulation through a lens, less the axis.
+class TracedLens(NamedTuple):
+    """Exact rays parallel to the axis through a lens, NaN for a ray that misses.
 
-    To the plane of its paraxial focus.
+    wave         (r,) m, path of the wave less that of the axis
+    modulation   (r,) m, path of the modulation less that of the axis
+    landing      (r,) m, height where the ray meets the image's plane
+    """
+
+    wave: NDArray[np.float64]
+    modulation: NDArray[np.float64]
+    landing: NDArray[np.float64]
+
+
+def traced_lens(
+    heights: ArrayLike,
+    *,
+    r1: float,
+    r2: float,
+    thickness: float,
+    phase: float,
+    group: float,
+    back: float | None = None,
+) -> TracedLens:
+    """Paths of wave and modulation through a lens to an image's plane, and where they meet it.
 
     heights        (r,) m, of rays parallel to the axis
     r1, r2         m, radii, above zero where the centre lies behind the surface; infinite for a plane
     thickness      m, on the axis
     phase, group   indices of the glass over those of the air
+    back           m, from the rear vertex to the image's plane; None: to the paraxial focus
 
-    The first is the lens's spherical aberration on a flat detector there, the second also has the group lag. At f/4
-    a plano-convex lens with its flat side to the target has +181 um at the edge and -51 um of lag; the correct way
-    round it is +43 and -50. NaN for a ray that misses.
+    The wave's path is the lens's spherical aberration on a flat detector there, the modulation's has the group lag too.
+    At f/4 a plano-convex lens with its flat side to the target has +181 um at the edge and -51 um of lag; the right
+    way round it is +43 and -50.
 
     Source: exact rays, see `ray_trace`.
     """
@@ -153,16 +174,19 @@ def traced_lens(
             return Plane((0.0, 0.0, vertex), (0.0, 0.0, 1.0))
         return SphericalSurface((0.0, 0.0, vertex + radius), abs(radius), far=radius < 0.0)
 
-    matrix = thick_lens(r1, r2, thickness=thickness, index=phase)
-    image = Plane((0.0, 0.0, thickness - float(matrix[0, 0] / matrix[1, 0])), (0.0, 0.0, 1.0))
+    if back is None:
+        matrix = thick_lens(r1, r2, thickness=thickness, index=phase)
+        back = -float(matrix[0, 0] / matrix[1, 0])
+    image = Plane((0.0, 0.0, thickness + back), (0.0, 0.0, 1.0))
     h = np.concatenate([[0.0], np.ravel(np.asarray(heights, float))])
-    front, back, start = surface(0.0, r1), surface(thickness, r2), -1.0
+    front, rear, start = surface(0.0, r1), surface(thickness, r2), -1.0
     position = np.stack([h, np.zeros_like(h), np.full_like(h, start)], axis=-1)
     direction = np.broadcast_to([0.0, 0.0, 1.0], position.shape)
 
-    def path(n: float) -> NDArray[np.float64]:
+    def traced(n: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rays = Rays(position, direction, np.zeros_like(h)).to(front, 1.0).refracted(front, 1.0 / phase)
-        rays = rays.to(back, n).refracted(back, phase).to(image, 1.0)
-        return rays.path[1:] - rays.path[0]
+        rays = rays.to(rear, n).refracted(rear, phase).to(image, 1.0)
+        return rays.path[1:] - rays.path[0], rays.position[1:, 0]
 
-    return path(phase), path(group)
+    (wave, landing), (modulation, _) = traced(phase), traced(group)
+    return TracedLens(wave, modulation, landing)

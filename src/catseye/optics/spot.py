@@ -134,8 +134,7 @@ def gaussian_spot(
     flatness      f, 1 or more: 1 a Gaussian, more a flat top with steep sides, as of a retroreflector wider than the
                   beam
 
-    Source: definition; a Gaussian is the result of two Gaussian apertures in series. See `matched_radius` for real
-    ones.
+    Source: definition; a Gaussian is the result of two Gaussian apertures in series.
 
     >>> float(gaussian_spot(0.0, 0.0, peak=4.0, radius=1.0, background=0.5))
     4.5
@@ -165,37 +164,6 @@ def reach(radius: ArrayLike, share: ArrayLike) -> Array:
     if not np.all((s > 0.0) & (s <= 1.0)):
         raise ValidityError(f"share {s[~((s > 0.0) & (s <= 1.0))].flat[0]} of a peak is not above 0 and up to 1")
     return np.asarray(np.asarray(radius, dtype=float) * np.sqrt(-0.5 * np.log(s)))
-
-
-def matched_radius(
-    distance: float, *, aperture: float, receiver: float, waist: float, wavelength: float, share: float = 0.5
-) -> float:
-    """Radius, m at the target, of the Gaussian spot matched at `share`.
-
-    distance, aperture, receiver, waist, wavelength   as for `offset_share`
-    share    above 0, below 1: of the peak; half by default
-
-    The real spot is flatter on top and steeper at its edge where the retroreflector is wider than the beam.
-
-    Source: `offset_share` and `reach`.
-
-    >>> round(matched_radius(120.0, aperture=0.0254, receiver=0.05, waist=0.010, wavelength=0.78e-6), 4)
-    0.0406
-    """
-    if not 0.0 < share < 1.0:
-        raise ValidityError(f"share {share} of a peak is not above 0 and below 1")
-    size = {"aperture": aperture, "receiver": receiver, "waist": waist, "wavelength": wavelength}
-    peak = float(offset_share(0.0, distance, **size))
-
-    def above(offset: float) -> float:
-        return float(offset_share(offset, distance, **size)) - share * peak
-
-    far = float(beam_radius(distance, waist=waist, wavelength=wavelength)) + aperture
-    while above(far) > 0.0:
-        far *= FALLS
-    from scipy.optimize import brentq
-
-    return float(brentq(above, 0.0, far, xtol=1e-6 * far) / reach(1.0, share))
 
 
 def _refuse(offset: ArrayLike, **named: float) -> None:

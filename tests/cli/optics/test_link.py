@@ -3,8 +3,11 @@
 import json
 import math
 
+import numpy as np
 import pytest
 
+from catseye.optics.gaussian_beam import radius
+from catseye.optics.retroreflector.dihedral import deviations
 from catseye.reduction.optics.link import Link, LinkReflector
 from catseye.reduction.optics.link_budget import link_budget
 
@@ -70,3 +73,35 @@ def test_every_option_is_taken_in_the_unit_of_its_name(catseye):
     assert told["received_power"] == pytest.approx(expected.received, rel=1e-12)
     assert told["u_range"] == pytest.approx(expected.u_range, rel=1e-12)
     assert told["noise_shares"] == pytest.approx(expected.noise_shares, rel=1e-12)
+
+
+def test_angles_too_wide_by_a_makers_limit_turn_the_beams_by_three_arc_seconds(catseye):
+    """[YODER58]: equal errors e of a glass n turn all six by (4/3) sqrt 6 n e; a lens that is wide loses nothing."""
+    words = ["link", "--distance", "120", "--dihedral-arcsec", "0.61"]
+    found = json.loads(catseye(*words, "--json")[1], parse_constant=pytest.fail)
+    assert found["deviation"] == pytest.approx(math.radians(3.0 / 3600), rel=0.01)
+    assert found["factors"]["dihedral errors"] == pytest.approx(1.0, abs=1e-4)
+    assert 0.0 < found["pupil_offset"] < 0.1e-6
+    assert "deviation by dihedral errors" in catseye(*words)[1]
+
+
+def test_a_narrow_lens_loses_the_light_of_turned_beams(catseye):
+    """Against two million rays of a Gaussian beam, each sector moved aside by distance times its deviation."""
+    errors = [12.0, -5.0, 8.0]
+    words = ["link", "--distance", "400", "--waist-mm", "15", "--receiver-mm", "15", "--index", "1"]
+    text = ",".join(map(str, errors))
+    found = json.loads(catseye(*words, f"--dihedral-arcsec={text}", "--json")[1])
+    turned = deviations(np.radians(np.array(errors) / 3600.0))
+    rng, beam = np.random.default_rng(1), radius(800.0, waist=0.015, wavelength=0.78e-6)
+    rays = 0.5 * beam * rng.standard_normal((2_000_000, 2))
+    hit = [np.mean(np.hypot(*(rays + 400.0 * one).T) < 0.015) for one in turned]
+    share = np.mean(hit) / np.mean(np.hypot(*rays.T) < 0.015)
+    assert share < 0.8
+    assert found["factors"]["dihedral errors"] == pytest.approx(share, abs=2e-3)
+
+
+@pytest.mark.parametrize(("text", "status"), [("60,x", 2), ("60,-20", 2), ("9000", 1)])
+def test_dihedral_errors_that_are_none_are_refused(catseye, text, status):
+    found, out, err = catseye("link", "--distance", "120", f"--dihedral-arcsec={text}")
+    assert (found, out) == (status, "")
+    assert "dihedral" in err

@@ -9,6 +9,8 @@ from catseye.optics import coating, gaussian_beam
 from catseye.optics.detector import Photodiode, spot_range
 from catseye.records.files.reading import read_record
 from catseye.records.site.beam import BeamTrain
+from catseye.records.site.mirror import MirrorGeometry
+from catseye.reduction.epoch.head import image_of
 from catseye.reduction.optics.beam import beam_profile, reduce_beam
 from repository import ROOT
 
@@ -159,6 +161,22 @@ def test_an_uncertain_place_shifts_the_range_like_drawn_places(head):
     spot = float(np.sqrt(np.mean(head.places[-1].radius ** 2)))
     drawn = np.mean(spot_range(places, spot, diode)) - spot_range(0.0, spot, diode)
     assert head.range_effects["image off the middle"] == pytest.approx(drawn, rel=0.02)
+
+
+def test_a_mirrors_sheet_with_the_trains_detector_has_the_same_uncertainty(head):
+    """The record in rad and µm against the train's ohm and pF: 3.334 µm, and a mean of 298 µm times 2 (5/100)^2."""
+    plate = head.train.detector
+    sheet = MirrorGeometry.model_construct(
+        detector_radius_mm=plate.radius_mm,
+        detector_lag_rad=head.detector_lag,
+        image_offset_um=plate.offset_um,
+        u_image_um=plate.u_offset_um,
+    )
+    metres = SPEED_OF_LIGHT / (4.0 * np.pi * 1500e6)
+    lead = image_of(sheet)
+    assert metres * lead.u == pytest.approx(head.u_image, rel=1e-3)
+    assert metres * lead.mean == pytest.approx(1.49e-6, rel=5e-3)
+    assert np.isnan(reduce_beam(plain()).detector_lag)
 
 
 def test_two_isolators_multiply(head):

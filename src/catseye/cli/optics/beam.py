@@ -11,6 +11,7 @@ from catseye.cli.results import tell
 
 @app.command(
     epilog="\b\nExample: catseye beam examples/beams/head.toml --distance-m 120 --out beam\n"
+    "Example: catseye beam examples/beams/train.toml --json\n"
     "Layout of FILE: catseye help formats/beam"
 )
 def beam(

@@ -8,6 +8,16 @@ from catseye.cli.commands import Json, app
 from catseye.cli.results import tell
 
 
+def _numbers(text: str | None) -> list[float] | None:
+    """Numbers of a text, between commas."""
+    if text is None:
+        return None
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as problem:
+        raise typer.BadParameter(f"{text!r} is not a number, or three between commas.") from problem
+
+
 @app.command(epilog="\b\nExample: catseye link --distance 120 --incidence-deg 20 --measured-volt 4.5")
 def link(  # noqa: PLR0913 - its options are its command line
     distance: Annotated[float, typer.Option("--distance", help="Distance from ranger to retroreflector, m.")],
@@ -31,6 +41,15 @@ def link(  # noqa: PLR0913 - its options are its command line
         float, typer.Option("--height-mm", help="Height of the reflector, face to corner, mm.")
     ] = 38.1,
     index: Annotated[float, typer.Option("--index", help="Phase index of the reflector; 1 for a hollow cube.")] = 1.511,
+    dihedral_arcsec: Annotated[
+        str | None,
+        typer.Option(
+            "--dihedral-arcsec",
+            metavar="E|A,B,C",
+            callback=_numbers,
+            help="Excess of the reflector's angles over right ones, of all or of each.",
+        ),
+    ] = None,
     duration: Annotated[float, typer.Option("--duration", help="Duration of one range, s.")] = 0.128,
     blocked_noise_volt: Annotated[
         float, typer.Option("--blocked-noise-volt", help="Rms of the samples with the beam blocked, V.")
@@ -57,6 +76,7 @@ def link(  # noqa: PLR0913 - its options are its command line
         aperture_mm=aperture_mm,
         height_mm=height_mm,
         index=index,
+        dihedral_arcsec=dihedral_arcsec,
         duration=duration,
         blocked_noise_volt=blocked_noise_volt,
         background_uw=background_uw,

@@ -1,6 +1,7 @@
 """Beam train as figure, text, JSON and files; coatings as curves."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from catseye.aliases import Progress
-from catseye.constants import DEGREE, MILLIMETRE
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.errors import ValidityError
 from catseye.gateways.optics.tables import PLACES, RETURNED
 from catseye.gateways.writers.drawing import BAD, FAINT, INK, SERIES, STYLE, Figure, Svg, mpl, svg
@@ -16,11 +17,14 @@ from catseye.gateways.writers.objects import json_page
 from catseye.gateways.writers.written import Files, origin, write_files
 from catseye.optics import coating
 from catseye.reduction.optics.beam import BeamPath, beam_profile, read_beam
+from catseye.reduction.optics.receiving import ReceivingOptics
 
 FORMAT = "catseye-beam-1"
 DRAWN = ("gold", "silver", "aluminium", "protected-aluminium", "dielectric")
 ANGLES = np.arange(0.0, 80.5, 0.5)  # degrees
 BAND_UM = (0.65, 0.95)
+STYLES = ("-", (0, (3, 2)))  # of x and y, which may be alike
+APART = 0.04  # of a panel's width: nearer names share a line
 WIDTHS = (10, 17, 19, 9, 9, 9)
 POLARIZATIONS: tuple[coating.Polarization, ...] = ("s", "p")
 
@@ -51,35 +55,54 @@ def beam_figure(beam_path: BeamPath) -> Svg:
 
 
 def _leg(ax, beam_path: BeamPath, leg: str, profile: tuple, start: float = 0.0) -> None:
-    """Radii in both planes and apertures, within a head."""
+    """Radii in both planes, apertures and names of the elements, within a head."""
     distances, radii = profile
-    for k, axis in enumerate("xy"):
-        ax.plot(distances, radii[:, k] / MILLIMETRE, color=SERIES[k], lw=1.6, label=axis)
+    for k, style in enumerate(STYLES):
+        ax.plot(distances, radii[:, k] / MILLIMETRE, color=SERIES[k], lw=1.6, ls=style)
     stops = [place for place in beam_path.places if place.leg == leg and np.isfinite(place.aperture)]
     top = 1.15 * max([float(np.max(radii)), *(place.aperture for place in stops)]) / MILLIMETRE
     for place in stops:
         at, edge = (place.way - start) / MILLIMETRE, place.aperture / MILLIMETRE
         ax.plot([at, at], [edge, top], color=INK, lw=2.2, solid_capstyle="butt")
     ax.set_ylim(0.0, top)
-    ax.legend(loc="best")
+    ax.margins(x=0.09)
+    for at, name in _names(beam_path, leg, start, apart=APART * float(np.ptp(distances))).items():
+        ax.axvline(at, color=FAINT, lw=0.5)
+        text = {"rotation": 90.0, "fontsize": 6.5, "color": INK, "va": "top", "ha": "right"}
+        ax.annotate(name, (at, 0.98 * top), xytext=(-2.0, 0.0), textcoords="offset points", **text)
+
+
+def _names(beam_path: BeamPath, leg: str, start: float, *, apart: float) -> dict[float, str]:
+    """Names of a leg's elements, and of the detector, by place, mm; those nearer than `apart` share a line."""
+    names: dict[float, str] = {}
+    for place in beam_path.places:
+        if place.leg == leg or (leg == "inward" and place.leg == "detector"):
+            at = (place.way - start) / MILLIMETRE
+            near = [other for other in names if abs(other - at) < apart]
+            if near:
+                names[near[0]] += f" | {place.name}"
+            else:
+                names[at] = place.name
+    return names
 
 
 def _range(ax, beam_path: BeamPath, profile: dict) -> None:
     clipped = next(place for place in beam_path.places if place.leg == "reflector")
-    for leg, style in (("range", "-"), ("back", (0, (4, 2)))):
+    for leg in ("range", "back"):
         distances, radii = profile[leg]
         along = distances - profile["range"][0][0]
         for k, axis in enumerate("xy"):
-            label = f"{axis}, {'out' if leg == 'range' else 'back, unclipped'}"
-            ax.plot(along, radii[:, k] / MILLIMETRE, color=SERIES[k], ls=style, lw=1.6, label=label)
+            label = axis if leg == "range" else None
+            ax.plot(along, radii[:, k] / MILLIMETRE, color=SERIES[k], ls=STYLES[k], lw=1.6, label=label)
     at, edge = beam_path.train.distance_m, clipped.aperture / MILLIMETRE
     ax.axvline(at, color=FAINT, lw=0.7)
     ax.plot([at, at], [edge, 10.0 * edge], color=INK, lw=2.2, solid_capstyle="butt")
     colour = BAD if clipped.clipped > 0.01 else INK
-    text = f"{clipped.name}  \n{100 * clipped.clipped:.2g} % misses it  "
+    missed = f"{100 * clipped.clipped:.2g} %" if clipped.clipped > 1e-7 else "nothing"
+    text = f"{clipped.name}  \n{missed} misses it  "
     ax.text(at, 1.05 * edge, text, fontsize=7.5, color=colour, va="bottom", ha="right")
     ax.set_ylim(0.0, 1.25 * max(edge, float(max(np.max(profile[leg][1]) for leg in ("range", "back"))) / MILLIMETRE))
-    ax.set(title="To the reflector and back", xlabel="path from the mirror (m)")
+    ax.set(title="To the reflector and back, unclipped", xlabel="path from the mirror (m)")
     ax.legend(loc="upper right", ncols=1)
 
 
@@ -92,7 +115,7 @@ def _power(ax, beam_path: BeamPath) -> None:
         if row.status != "ok":
             ax.axvline(row.distance, color=BAD, lw=1.0, ls=":")
     ax.set(title="Share of the beam", xlabel="distance to the reflector (m)", ylabel="share (%)")
-    ax.set_ylim(max(0.0, 1.1 * min(collected, default=0.0) - 10.0), 101.0)
+    ax.set_ylim(max(0.0, min(90.0, 1.1 * min(collected, default=0.0) - 10.0)), 101.0)
     ax.legend(loc="lower left")
 
 
@@ -180,6 +203,12 @@ def beam_object(beam_path: BeamPath) -> dict[str, Any]:
         "smallest": {"waist": beam_path.smallest_waist[0], "radius": beam_path.smallest_waist[1]},
         "range_effects": beam_path.range_effects,
         "u_image": beam_path.u_image,
+        "detector_lag": beam_path.detector_lag,
+        "receiving": {
+            "focal_length": beam_path.receiving.focal_length,
+            "defocus": beam_path.receiving.defocus,
+            "traced": None if beam_path.receiving.traced is None else asdict(beam_path.receiving.traced),
+        },
         "laser": beam_path.laser,
     }
 
@@ -211,12 +240,34 @@ def lines(beam_path: BeamPath) -> Iterator[str]:
         yield f"{row.distance:<12g} {size:>17} {100 * row.hit:10.4f} {got}"
     waist, spot = (1e3 * v for v in beam_path.smallest_waist)
     yield f"smallest possible spot there: {spot:.3f} mm, from a waist of {waist:.3f} mm at the head"
+    yield from _image(beam_path.receiving)
     for name, effect in beam_path.range_effects.items():
         yield f"range too long by {_cell(effect * 1e6, '.3f') or 'an unknown number of'} µm: {name}"
     if np.isfinite(beam_path.u_image):
         yield f"u of the range from the image's place: {beam_path.u_image * 1e6:.3f} µm"
+        yield f"centre of the detector behind its rim: {beam_path.detector_lag * 1e3:.2f} mrad"
     for name, value in beam_path.laser.items():
         yield f"{name.replace('_', ' ')}: {f'{value * 1e6:.3f} µm' if name.startswith('range') else f'{value:.4g}'}"
+
+
+def _image(receiving: ReceivingOptics) -> Iterator[str]:
+    """Focal length, defocus and the image by exact rays."""
+    for name, pair in (
+        ("focal length of the receiving optics", receiving.focal_length),
+        ("detector behind the waist of the image", receiving.defocus),
+    ):
+        sizes = list(dict.fromkeys(_cell(v / MILLIMETRE, ".3f") for v in pair if np.isfinite(v)))
+        if sizes:
+            yield f"{name}: {' x '.join(sizes)} mm"
+    shift = float(np.mean(receiving.focal_length)) * ARCSECOND * 1e6
+    if np.isfinite(shift):
+        yield f"light 1 arcsec off the axis moves the image by {shift:.2f} µm"
+    if receiving.traced is not None:
+        image = receiving.traced
+        yield (
+            f"image by exact rays: rms radius {image.radius * 1e6:.2f} µm, {100.0 * image.share:.3f} % of the light on "
+            "the detector"
+        )
 
 
 def write_beam(beam_path: BeamPath, directory: Path, inputs: dict[str, str], progress: Progress | None = None) -> None:

@@ -1,4 +1,7 @@
-"""Figure of polarization in cube corners as SVG text: sectors, analyser, far-field axis."""
+"""Figure of polarization in cube corners as SVG text: sectors, analyser, far-field axis.
+
+Source: [PARKER04] section 6.2.5; chapter 8 (rotation about the beam).
+"""
 
 from typing import Any
 

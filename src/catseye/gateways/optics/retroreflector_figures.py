@@ -1,4 +1,7 @@
-"""Figures of retroreflectors as SVG text: return by angle, and aberration of a ball."""
+"""Figures of retroreflectors as SVG text: return by angle, and aberration of a ball.
+
+Source: [PARKER04] section 6.2.4; chapter 8 (reflected power by angle).
+"""
 
 from dataclasses import dataclass, replace
 from typing import Any

@@ -13,6 +13,8 @@ at the small sphere, by pi - 2w at the mirror, by t - r again:
 
 Exact. A sphere focuses its outer rays short. The memo's ball, R2 = 3.799", is 1.3 mm shorter than the paraxial focus,
 3.852": rays near the axis come back diverging, those at 10 mm straight, those farther out converging.
+
+Source: [PARKER04] chapter 6, figure 6.2.
 """
 
 from dataclasses import dataclass, replace
@@ -167,7 +169,7 @@ class BallCatsEye:
         share = self.clear_area(incidence, azimuth) / (np.pi * self.aperture**2)
         return share * (1.0 - reflected) ** 2 * self.mirror_reflectance
 
-    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+    def sectors(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Sectors:
         """Single sector: a mirror, which preserves polarization at any incidence.
 
         As on the axis.
@@ -175,10 +177,12 @@ class BallCatsEye:
         Raises ValidityError from behind.
         """
         area = self.clear_area(incidence, azimuth)
-        if not area > 0.0:
-            raise ValidityError(f"incidence {incidence:.4g} rad: no part of the ball returns light")
+        if not np.all(area > 0.0):
+            dark = np.broadcast_to(incidence, np.shape(area))[~(area > 0.0)].flat[0]
+            raise ValidityError(f"incidence {dark:.4g} rad: no part of the ball returns light")
         amplitude = np.sqrt(self.return_share(incidence, azimuth) / area * np.pi) * self.aperture
-        return Sectors(np.ones(1), np.array([-amplitude * np.eye(2)], dtype=np.complex128))
+        jones = (-amplitude[..., None, None, None] * np.eye(2)).astype(np.complex128)
+        return Sectors(np.ones((*np.shape(amplitude), 1)), jones)
 
     def deviation(self, height: ArrayLike) -> Array:
         """Convergence angle of a returned ray, rad; below 0 diverging.

@@ -12,6 +12,8 @@ matrices are each other's transpose.
 
 Reflection from a corner does not change the path length, but the six phases differ: on the axis of the far field the
 six add as amplitudes. Close by, and in all the returned light together, they add as powers.
+
+Source: [PARKER04] section 6.2.5.
 """
 
 from dataclasses import dataclass
@@ -79,12 +81,12 @@ def solid_corner(index: float, outside: complex = 1.0, *, bare_face: bool = Fals
     return Corner(index, surface(inside=index, outside=outside), bare_face)
 
 
-def sector_jones(corner: Corner, incidence: float, azimuth: float = 0.0) -> Complex:
-    """Jones matrices (6, 2, 2) of ORDERS, axes (u, v), power-normalized.
+def sector_jones(corner: Corner, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Complex:
+    """Jones matrices (..., 6, 2, 2) of ORDERS, axes (u, v), power-normalized.
 
     corner      the corner
-    incidence   rad, 0 to below a right angle, of the direction to the ranger from z
-    azimuth     rad, of that direction about z, from an edge
+    incidence   (...) rad, 0 to below a right angle, of the direction to the ranger from z
+    azimuth     (...) rad, of that direction about z, from an edge
 
     Raises ValidityError where a face cannot be reached: beyond an internal incidence of 35.26 deg some corners are
     missed.
@@ -98,28 +100,37 @@ def sector_jones(corner: Corner, incidence: float, azimuth: float = 0.0) -> Comp
     """
     toward, (u, v) = _axes(incidence, azimuth)
     inward, enter = _into(corner, -toward)
-    if np.any(EDGES @ inward >= 0.0):
+    missed = np.any(inward @ EDGES.T >= 0.0, axis=-1)
+    if missed.any():
+        i, a = (x[missed].flat[0] for x in np.broadcast_arrays(incidence, azimuth))
         raise ValidityError(
-            f"incidence {incidence:.4g} rad at azimuth {azimuth:.4g}: the light no longer meets all three faces "
+            f"incidence {i:.4g} rad at azimuth {a:.4g}: the light no longer meets all three faces "
             "(expected a smaller incidence)"
         )
     leave = _out_of(corner, toward)
-    frame = np.stack([u, v], axis=1)
+    frame = np.stack([u, v], axis=-1)
     matrices = []
     for order in ORDERS:
         k, chain = inward, enter
         for face in order:
             k, step = reflection_matrix(k, EDGES[face], corner.mirror)
             chain = step @ chain
-        matrices.append(frame.T @ leave @ chain @ frame)
-    return np.array(matrices)
+        matrices.append(np.swapaxes(frame, -1, -2) @ leave @ chain @ frame)
+    return np.stack(matrices, axis=-3)
 
 
-def sector_shares(corner: Corner, incidence: float, azimuth: float = 0.0, *, aperture: float, height: float) -> Array:
-    """Shares (6,) of the clear area by ORDERS; they sum to 1.
+def sector_shares(
+    corner: Corner,
+    incidence: ArrayLike,
+    azimuth: ArrayLike = 0.0,
+    *,
+    aperture: float,
+    height: float,
+) -> Array:
+    """Shares (..., 6) of the clear area by ORDERS; they sum to 1.
 
     corner             the corner
-    incidence, azimuth rad, as for `sector_jones`
+    incidence, azimuth (...) rad, as for `sector_jones`
     aperture, height   m, above 0: radius of the clear, round face, and the corner's depth behind it
 
     Seen along the light within, the edges and their continuations divide the clear area, which is what the face and its
@@ -136,15 +147,18 @@ def sector_shares(corner: Corner, incidence: float, azimuth: float = 0.0, *, ape
     inward, _ = _into(corner, -_axes(incidence, azimuth)[0])
     angle = (np.arange(RAYS) + 0.5) * (2.0 * np.pi / RAYS)
     out = np.stack([np.cos(angle), np.sin(angle)], axis=1)  # in the face's plane, about where the axis ray enters
-    middle = -height * inward[:2] / -inward[2]  # there the ray through the corner meets the face
+    middle = -height * inward[..., :2] / -inward[..., 2:]  # there the ray through the corner meets the face
     reach = np.minimum(_to_rim(out, middle, aperture), _to_rim(-out, middle, aperture))
-    if not np.all(reach > 0.0):
-        raise ValidityError(f"incidence {incidence:.4g} rad: no part of the face returns light")
+    dark = np.any(reach <= 0.0, axis=-1)
+    if dark.any():
+        i = np.broadcast_to(incidence, dark.shape)[dark].flat[0]
+        raise ValidityError(f"incidence {i:.4g} rad: no part of the face returns light")
     # positions of the faces along a ray offset by `out`, nearest first
-    when = (np.concatenate([out, np.zeros((RAYS, 1))], axis=1) @ EDGES.T) / -(EDGES @ inward)
-    order = np.argsort(when, axis=1)
-    shares = [np.sum(reach[np.all(order == sequence, axis=1)] ** 2) for sequence in ORDERS]
-    return np.array(shares) / np.sum(reach**2)
+    when = (out @ EDGES[:, :2].T) / -(inward @ EDGES.T)[..., None, :]
+    first, last = np.argmin(when, axis=-1), np.argmax(when, axis=-1)
+    area = reach**2
+    shares = [np.sum(np.where((first == a) & (last == c), area, 0.0), axis=-1) for a, _, c in ORDERS]
+    return np.stack(shares, axis=-1) / np.sum(area, axis=-1)[..., None]
 
 
 def far_field_jones(jones: ArrayLike, shares: ArrayLike | None = None) -> Complex:
@@ -162,7 +176,8 @@ def far_field_jones(jones: ArrayLike, shares: ArrayLike | None = None) -> Comple
     >>> round(float(np.sum(np.abs(light) ** 2)), 3)
     0.264
     """
-    return np.einsum("s,sij->ij", _weights(shares), np.asarray(jones, dtype=complex))
+    weights = np.full(6, 1.0 / 6.0) if shares is None else np.asarray(shares, dtype=float)
+    return np.einsum("s,sij->ij", weights, np.asarray(jones, dtype=complex))
 
 
 def returned_power(
@@ -170,10 +185,10 @@ def returned_power(
 ) -> Array:
     """Share (...) of the power returned in total, optionally through an analyser.
 
-    jones      (6, 2, 2) of the sectors
+    jones      (..., 6, 2, 2) of the sectors
     field      (..., 2) Jones vectors of the light that falls on it, of unit power
     analyser   (..., 2) of unit power: the state that passes; None for no analyser
-    shares     (6,) of the area, a sixth each when not given
+    shares     (..., 6) of the area, a sixth each when not given
 
     Source: sum of powers: Parseval's theorem makes it the power of the whole far field as well. Exact.
 
@@ -181,12 +196,12 @@ def returned_power(
     >>> float(returned_power(j, [1.0, 0.0], analyser=[1.0, 0.0]).round(12))
     1.0
     """
-    back = np.einsum("sij,...j->...si", np.asarray(jones, dtype=complex), np.asarray(field, dtype=complex))
+    back = np.einsum("...sij,...j->...si", np.asarray(jones, dtype=complex), np.asarray(field, dtype=complex))
     if analyser is None:
         power = np.sum(np.abs(back) ** 2, axis=-1)
     else:
         power = np.abs(np.einsum("...i,...si->...s", np.conj(np.asarray(analyser, dtype=complex)), back)) ** 2
-    return power @ _weights(shares)
+    return np.asarray(np.sum(power * (1.0 / power.shape[-1] if shares is None else np.asarray(shares)), axis=-1))
 
 
 def through_plate(jones: ArrayLike, plate: ArrayLike) -> Complex:
@@ -208,55 +223,59 @@ def through_plate(jones: ArrayLike, plate: ArrayLike) -> Complex:
     return plate.T @ np.asarray(jones, dtype=complex) @ plate
 
 
-def _weights(shares: ArrayLike | None) -> Array:
-    return np.full(6, 1.0 / 6.0) if shares is None else np.asarray(shares, dtype=float)
-
-
-def _axes(incidence: float, azimuth: float) -> tuple[Array, tuple[Array, Array]]:
-    """Direction to the ranger and the axes across it."""
-    if not 0.0 <= incidence < 0.5 * np.pi:
-        raise ValidityError(f"incidence {incidence:.4g} rad is outside 0 to a right angle")
-    sine = np.sin(incidence)
-    toward = np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(incidence)])
-    u = np.array([1.0, 0.0, 0.0]) - toward[0] * toward
-    u = u / np.linalg.norm(u)
+def _axes(incidence: ArrayLike, azimuth: ArrayLike) -> tuple[Array, tuple[Array, Array]]:
+    """Directions (..., 3) to the ranger and the axes across them."""
+    i, a = np.broadcast_arrays(np.asarray(incidence, float), np.asarray(azimuth, float))
+    good = (i >= 0.0) & (i < 0.5 * np.pi)
+    if not good.all():
+        raise ValidityError(f"incidence {i[~good].flat[0]:.4g} rad is outside 0 to a right angle")
+    toward = np.stack([np.sin(i) * np.cos(a), np.sin(i) * np.sin(a), np.cos(i)], axis=-1)
+    u = np.array([1.0, 0.0, 0.0]) - toward[..., :1] * toward
+    u = u / np.linalg.norm(u, axis=-1, keepdims=True)
     return toward, (u, np.cross(toward, u))
 
 
 def _into(corner: Corner, outside: Array) -> tuple[Array, Complex]:
-    """Direction within the corner of light along `outside`, and the face's matrix."""
-    flat = outside[:2] / corner.index
-    inward = np.array([*flat, -np.sqrt(1.0 - flat @ flat)])
+    """Directions within the corner of light along `outside`, and the face's matrices."""
+    inward = _within(corner, outside, -1.0)
     return inward, transfer(outside, inward, _face_s(outside), *_face_gains(corner, outside, inward))
 
 
 def _out_of(corner: Corner, outside: Array) -> Complex:
-    """Matrix of the face for light leaving along `outside`, by reversal."""
-    flat = outside[:2] / corner.index
-    within = np.array([*flat, np.sqrt(1.0 - flat @ flat)])
+    """Matrices of the face for light leaving along `outside`, by reversal."""
+    within = _within(corner, outside, 1.0)
     return transfer(within, outside, _face_s(outside), *_face_gains(corner, outside, within))
 
 
+def _within(corner: Corner, outside: Array, sign: float) -> Array:
+    """Refracted directions (..., 3), down or up."""
+    flat = outside[..., :2] / corner.index
+    return np.concatenate([flat, sign * np.sqrt(1.0 - np.sum(flat**2, axis=-1, keepdims=True))], axis=-1)
+
+
 def _face_s(outside: Array) -> Array:
-    """Vector across the plane of incidence on the face."""
-    size = np.hypot(*outside[:2])
-    return np.array([1.0, 0.0, 0.0]) if size < 1e-12 else np.array([-outside[1], outside[0], 0.0]) / size
+    """Vectors across the plane of incidence on the face."""
+    size = np.hypot(outside[..., 0], outside[..., 1])[..., None]
+    straight = size < 1e-12
+    turned = np.stack([-outside[..., 1], outside[..., 0], np.zeros(outside.shape[:-1])], axis=-1)
+    return np.where(straight, np.array([1.0, 0.0, 0.0]), turned / np.where(straight, 1.0, size))
 
 
-def _face_gains(corner: Corner, outside: Array, inside: Array) -> tuple[float, float]:
+def _face_gains(corner: Corner, outside: Array, inside: Array) -> tuple[ArrayLike, ArrayLike]:
     """Amplitudes transmitted by the face in s and p, as roots of power.
 
     The same in both directions.
     """
     if not corner.bare_face or corner.index == 1.0:
         return 1.0, 1.0
-    c, d, n = abs(outside[2]), abs(inside[2]), corner.index
+    c, d, n = np.abs(outside[..., 2]), np.abs(inside[..., 2]), corner.index
     common = 2.0 * np.sqrt(n * c * d)
     return common / (c + n * d), common / (n * c + d)
 
 
 def _to_rim(out: Array, middle: Array, aperture: float) -> Array:
-    """Distance from `middle` along `out` to the rim; below 0 outside."""
-    along = out @ middle
-    square = along**2 + aperture**2 - middle @ middle
-    return np.where((square > 0.0) & (middle @ middle < aperture**2), np.sqrt(np.maximum(square, 0.0)) - along, -1.0)
+    """Distances (..., rays) from `middle` (..., 2) along `out` (rays, 2) to the rim; below 0 outside."""
+    along = middle @ out.T
+    square = along**2 + aperture**2 - np.sum(middle**2, axis=-1)[..., None]
+    inside = (square > 0.0) & (np.sum(middle**2, axis=-1)[..., None] < aperture**2)
+    return np.where(inside, np.sqrt(np.maximum(square, 0.0)) - along, -1.0)

@@ -22,7 +22,6 @@ from catseye.aliases import Array
 from catseye.errors import ValidityError
 from catseye.optics.gaussian_beam import share_within
 
-LEVER = 4.0 * np.sqrt(6.0) / 3.0  # deviation over equal dihedral errors, in air
 ORDERS = tuple(permutations(range(3)))
 SMALL = 1e-2  # rad: the formula's next order is a hundredth of it
 NODES = 64
@@ -54,21 +53,6 @@ def deviations(errors: ArrayLike, index: float = 1.0) -> Array:
         turned = e[k] * (edges[j] - edges[i]) + e[i] * (edges[k] - edges[j]) + e[j] * (edges[k] - edges[i])
         beams.append(2.0 * along * index * turned)
     return np.array(beams)
-
-
-def equal_errors(deviation: ArrayLike, index: float = 1.0) -> Array:
-    """Equal dihedral error, rad, for a given deviation of all beams.
-
-    deviation   rad, of a beam from the right direction: a maker's "180 deg within 3 arcsec"
-    index       phase index of the glass over that of the air; 1 for a hollow corner
-
-    Source: [YODER58]; deviation / ((4/3) sqrt 6 n). Of all errors within a deviation these are the worst on
-    the axis, since no beam remains there.
-
-    >>> round(float(equal_errors(3.0, 1.511)), 2)  # arcsec as well as rad
-    0.61
-    """
-    return np.asarray(deviation, dtype=float) / (LEVER * index)
 
 
 def on_axis_share(deviation: float, *, aperture: float, beam_radius: float, wavelength: float) -> float:

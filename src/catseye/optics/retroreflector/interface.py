@@ -24,8 +24,8 @@ RIGHT = 0.5 * np.pi
 class Sectors(NamedTuple):
     """Sectors of a retroreflector in polarized light: shares and Jones matrices.
 
-    shares   (k,), summing to 1
-    jones    (k, 2, 2) amplitudes with the losses, in the axes of `corner_polarization`: as the ranger sees them
+    shares   (..., k), summing to 1
+    jones    (..., k, 2, 2) amplitudes with the losses, in the axes of `corner_polarization`: as the ranger sees them
     """
 
     shares: Array
@@ -41,7 +41,7 @@ class Retroreflector(Protocol):
     acceptance       largest incidence of use at any azimuth
     clear_area       m^2 across the beam: light entering there returns
     return_share     returned share of the light on the full clear face
-    sectors          the same for polarized light, at one incidence: for `corner_polarization.returned_power`
+    sectors          the same for polarized light: for `corner_polarization.returned_power`
     """
 
     @property
@@ -53,7 +53,7 @@ class Retroreflector(Protocol):
     def range_change(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array: ...
     def clear_area(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array: ...
     def return_share(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Array: ...
-    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors: ...
+    def sectors(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Sectors: ...
 
 
 def fresnel(cosine: ArrayLike, ratio: ArrayLike) -> tuple[Array, Array]:

@@ -25,7 +25,7 @@ KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "plate": (("thickness_mm", "glass"), ("incidence_deg", "plane")),
     "aperture": (("aperture_radius_mm",), ()),
     "splitter": (("transmission",), ()),
-    "isolator": ((), ("turn_deg", "leak")),
+    "isolator": ((), ("turn_deg", "temperature_c", "leak")),
 }
 COMMON = {"kind", "name", "aperture_radius_mm", "transmission"}
 
@@ -85,7 +85,8 @@ class BeamElement(Record):
     incidence_deg        angle of incidence on a mirror or a plate
     plane                axis in the plane of incidence
     coating              coating of a mirror, by its name in `catseye plot coating`
-    turn_deg             rotation by the rotator of an isolator
+    turn_deg             rotation by the rotator of an isolator at 20 °C
+    temperature_c        temperature of an isolator's rotator, a garnet; by default 20
     leak                 leakage of each polarizer of an isolator
     """
 
@@ -105,6 +106,7 @@ class BeamElement(Record):
     plane: Axis | None = None
     coating: str | None = None
     turn_deg: Annotated[float, Within(0, 90)] | None = None
+    temperature_c: Annotated[float, Within(-40, 80)] | None = None
     leak: Leak | None = None
 
     @model_validator(mode="after")

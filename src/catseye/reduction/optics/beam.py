@@ -22,6 +22,7 @@ from catseye.errors import InputError, ValidityError
 from catseye.optics import abcd, coating, detector, gaussian_beam, glass, isolator, receiver
 from catseye.records.files.reading import Folder
 from catseye.records.site.beam import BeamElement, BeamTrain, Laser
+from catseye.reduction.optics.receiving import ReceivingOptics, TracedImage, receiving_optics, traced_image
 from catseye.signal.systematics.feedback import fringe_contrast
 from catseye.verdict import Verdict
 
@@ -86,6 +87,8 @@ class BeamPath:
     smallest_waist m: waist at the head for the smallest spot at that distance, and the spot's radius
     range_effects  name: m, range error (positive: too long); NaN where the light there is not Gaussian
     u_image        m, standard uncertainty of the range from the image's place on the detector; NaN if not known
+    receiving      focal length, defocus and image of the optics before the detector
+    detector_lag   rad, of the detector's centre behind its rim: of a mirror's sheet; NaN if not known
     laser          what comes back into the laser, by name; empty without an isolator or `back_reflection`
     """
 
@@ -96,6 +99,8 @@ class BeamPath:
     smallest_waist: tuple[float, float]
     range_effects: dict[str, float]
     u_image: float
+    receiving: ReceivingOptics
+    detector_lag: float
     laser: dict[str, float]
 
     @property
@@ -130,7 +135,8 @@ def reduce_beam(train: BeamTrain) -> BeamPath:
 
     Raises InputError where a glass, a coating or the geometry is invalid.
 
-    Source: [SIEGMAN86] ch. 15, 17, 20; [COLLINS70] for the return; see each formula.
+    Source: [PARKER04] figure 6.1 for the elements; [SIEGMAN86] ch. 15, 17, 20; [COLLINS70] for the return; see each
+    formula.
     """
     try:
         leaving, outward, power = _outward(train)
@@ -148,6 +154,8 @@ def reduce_beam(train: BeamTrain) -> BeamPath:
             smallest_waist=(waist, waist * math.sqrt(2.0)),
             range_effects=range_effects(train, back),
             u_image=_u_image(train),
+            receiving=_receiving(train, back),
+            detector_lag=math.nan if (diode := _diode(train)) is None else diode.lag(train.modulation_hz),
             laser=_into_laser(train),
         )
     except ValidityError as problem:
@@ -178,8 +186,45 @@ def range_effects(train: BeamTrain, back: tuple[BeamPlace, ...]) -> dict[str, fl
             bent = {"powers": -float(_matrices(train, element)[0][1, 0]), "phase": n_p, "group": n_g}
             edge = min(place.aperture, WIDE * light)
             effects[f"group lag of {_called(element)}"] = float(receiver.lens_group_range(edge, light, **bent))
+            if (image := _traced(train, back)) is not None:
+                effects[f"spherical aberration of {_called(element)}"] = image.range_error
     effects.update(_image_effects(train, back[-1]))
     return effects
+
+
+def _receiving(train: BeamTrain, back: tuple[BeamPlace, ...]) -> ReceivingOptics:
+    """Receiving optics; places from the reflector on."""
+    matrices = [_matrices(train, element) for element in train.inward]
+    focal_length, defocus = receiving_optics(matrices, image=(back[-1].radius, back[-1].curvature), light=_light(train))
+    return ReceivingOptics(focal_length, defocus, _traced(train, back))
+
+
+def _traced(train: BeamTrain, back: tuple[BeamPlace, ...]) -> TracedImage | None:
+    """Image by exact rays; None where another element than one thick lens bends the light, or it is not Gaussian."""
+    bending = [
+        element
+        for element in train.inward
+        if element.kind in ("lens", "thick_lens", "plate") or (element.kind == "mirror" and element.radius_mm)
+    ]
+    if len(bending) != 1 or bending[0].kind != "thick_lens":
+        return None
+    lens = bending[0]
+    solid = [element for element in train.inward if element.kind != "space"]
+    at = next(k for k, element in enumerate(solid) if element is lens)
+    beam_radius = float(np.sqrt(np.mean([p for p in back if p.leg == "inward"][at].radius ** 2)))
+    if not math.isfinite(beam_radius):
+        return None
+    after = train.inward[next(k for k, element in enumerate(train.inward) if element is lens) + 1 :]
+    r1, r2 = (math.inf if r is None else r * MILLIMETRE for r in (lens.r1_mm, lens.r2_mm))
+    return traced_image(
+        beam_radius,
+        aperture=_aperture(lens),
+        surfaces=(r1, r2),
+        thickness=_length(lens),
+        indices=_indices(train, lens),
+        back=sum(map(_length, after)),
+        detector=train.detector.radius_mm * MILLIMETRE,
+    )
 
 
 def _diode(train: BeamTrain) -> detector.Photodiode | None:
@@ -223,7 +268,7 @@ def _into_laser(train: BeamTrain) -> dict[str, float]:
     share, actual_share = 1.0, 1.0
     for element in train.outward:
         if element.kind == "isolator":
-            device = _isolator(element)
+            device = _isolator(train, element)
             field = isolator.jones_out(device)[:, 0]
             share, actual_share = share * isolator.back_share(device), actual_share * isolator.back_share(device, field)
             quantities["isolation_db"], quantities["worst_isolation_db"] = _decibel(actual_share), _decibel(share)
@@ -453,15 +498,22 @@ def _transmission(train: BeamTrain, element: BeamElement) -> float:
     if element.kind == "mirror" and element.coating is not None:
         return element.transmission * _reflected(train, element)[0]
     if element.kind == "isolator":
-        return isolator.forward_share(_isolator(element))
+        return isolator.forward_share(_isolator(train, element))
     return element.transmission
 
 
-def _isolator(element: BeamElement) -> isolator.Isolator:
-    """Isolator with its first polarizer along the laser's field."""
-    usual = isolator.Isolator()
+def _isolator(train: BeamTrain, element: BeamElement) -> isolator.Isolator:
+    """Isolator with its first polarizer along the laser's field.
+
+    Its turn holds at 20 °C and the train's wavelength; warmer, the rotator turns by less.
+    """
+    usual, light = isolator.Isolator(), train.wavelength_um
+    turn = usual.turn if element.turn_deg is None else element.turn_deg * DEGREE
+    if element.temperature_c is not None:
+        turned = isolator.faraday_turn(light, element.temperature_c, design_um=light)
+        turn *= float(turned) / isolator.DESIGN_TURN
     return isolator.Isolator(
-        turn=usual.turn if element.turn_deg is None else element.turn_deg * DEGREE,
+        turn=turn,
         leak=usual.leak if element.leak is None else element.leak,
         transmission=element.transmission,
     )

@@ -66,9 +66,11 @@ class LinkReflector:
     height       m, of the corner behind the face
     index        phase index of its material: 1 for a hollow cube
     reflectance  of all its surfaces
+    dihedral     rad, by which the angles between its faces exceed right angles
     """
 
     aperture: float = 25.4e-3
     height: float = 38.1e-3
     index: float = 1.511
     reflectance: float = 0.92
+    dihedral: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -8,6 +8,7 @@ from catseye.constants import SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import ValidityError
 from catseye.optics.gaussian_beam import radius, returned_share, share_within
 from catseye.optics.receiver import noise_density, signal_current, u_phase
+from catseye.optics.retroreflector.dihedral import collected_share, deviations, pupil_offset
 from catseye.optics.retroreflector.prism import clear_share
 from catseye.reduction.optics.link import Link, LinkReflector
 from catseye.signal.systematics.leakage import worst_range_error
@@ -30,6 +31,8 @@ class LinkBudget:
                      wavelength where it is as large as the return
     noise_shares     name: share of the noise's density
     clipped          True if the amplitude exceeds the converter's range
+    deviation        rad, largest of the six returned beams from the way back
+    pupil_offset     m, range error of a bare detector in these beams, positive where too long; a lens removes it
     """
 
     factors: dict[str, float]
@@ -41,6 +44,8 @@ class LinkBudget:
     crosstalk_range: float
     noise_shares: dict[str, float]
     clipped: bool
+    deviation: float
+    pupil_offset: float
 
     @property
     def verdict(self) -> Verdict:
@@ -96,6 +101,12 @@ def link_budget(
         "reflector's surfaces": reflector.reflectance,
         "comes into the lens": returned_share(distance, **size) / centred,
     }
+    turned = np.hypot(*deviations(reflector.dihedral, reflector.index).T)
+    if turned.any():
+        back = radius(2.0 * distance, waist=link.waist, wavelength=link.wavelength)
+        factors["dihedral errors"] = float(
+            np.mean(collected_share(turned, distance, beam_radius=back, receiver=link.receiver))
+        )
     received = link.power * float(np.prod(list(factors.values())))
     amplitude = float(signal_current(received, depth=link.depth, responsivity=link.responsivity))
     amplitude *= link.volts_per_ampere
@@ -115,6 +126,10 @@ def link_budget(
         crosstalk_range=float(worst_range_error(min(link.crosstalk / amplitude, 1.0), 2.0 * half)),
         noise_shares={name: part / density for name, part in parts.items()},
         clipped=amplitude > link.full_scale_volt,
+        deviation=float(turned.max()),
+        pupil_offset=pupil_offset(
+            float(np.mean(turned) * np.sign(np.sum(reflector.dihedral))), aperture=effective, beam_radius=beam
+        ),
     )
 
 
