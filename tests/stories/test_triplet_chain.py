@@ -21,7 +21,7 @@ from catseye.reduction.triplet.ties import (
     triplet_observations,
     triplet_start,
 )
-from catseye.reduction.triplet.use import MountedTriplet, ball_ranges, scan_points_from_balls
+from catseye.reduction.triplet.use import MountedTriplet, ball_ranges
 
 U_RANGE, U_PER_METRE = 15e-6, 0.2e-6  # m, and of the distance: the usual night's
 U_ZERO, U_GROUND, U_PLACE = 30e-6, 100e-6, 10e-3  # m: zeros of the rangers, ground points, typed positions
@@ -194,9 +194,14 @@ def step_by_step(site, night):
     ranger = np.tile(np.repeat(np.arange(k), 2), n)
     covariance = np.diag(variance(night.to_prisms).ravel()) + U_ZERO**2 * (ranger[:, None] == ranger)
     ranges = ball_ranges(site.units, site.scan, night.to_prisms, covariance=covariance)
-    return scan_points_from_balls(
-        site.scan, first.x[: 3 * n].reshape(n, 3), ball_covariance=of_balls, ranges=ranges
-    ).require_converged()
+    unit, ranger = np.divmod(np.arange(n * k), k)
+    columns = 3 * k + 3 * np.arange(n)  # of the balls, behind the scan points
+    balls = first.x[: 3 * n].reshape(n, 3)
+    groups = (
+        ObservedCoordinates.of_points("balls", balls, of_balls, columns),
+        Distances("ball distances", ranges.d_bc.ravel(), ranges.covariance, 3 * ranger, columns[unit]),
+    )
+    return adjust(np.concatenate([site.scan.ravel(), balls.ravel()]), groups).require_converged()
 
 
 def scattered(site, solve, nights, seed):

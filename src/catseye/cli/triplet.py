@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 @app.command(
     epilog="\b\nExample: catseye triplet examples/triplets/TR99.toml\n"
     "         catseye triplet examples/triplets/*.toml --out triplet-sheets\n"
+    "         catseye triplet triplets/TR01.toml --write TR01.toml --replaces night-01/triplets/TR01.toml\n"
     "         catseye triplet --blank sheet.html"
 )
 def triplet(  # noqa: PLR0913 - its options are its command line
@@ -26,6 +27,22 @@ def triplet(  # noqa: PLR0913 - its options are its command line
     ] = None,
     blank: Annotated[
         Path | None, typer.Option("--blank", metavar="SHEET.html", help="Blank form to write, to print and fill in.")
+    ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            "--write",
+            metavar="TRnn.toml|DIR",
+            help="Record of the site to get H_corr, L_MPBC, their u and provenance; other keys stay.",
+        ),
+    ] = None,
+    replaces: Annotated[
+        Path | None,
+        typer.Option(
+            "--replaces",
+            metavar="TRnn.toml",
+            help="Record of the unit whose place it takes: --write writes a complete record.",
+        ),
     ] = None,
     certificate: Certificate = None,
     laboratory: Laboratory = None,
@@ -38,11 +55,15 @@ def triplet(  # noqa: PLR0913 - its options are its command line
     """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not."""
     if not files and blank is None:
         raise typer.BadParameter("at least one is needed, or --blank.", param_hint="'FILE.toml ...'")
-    if not files and (out is not None or json or certificate is not None):
-        raise typer.BadParameter("are needed with --out, --certificate and --json.", param_hint="'FILE.toml ...'")
+    if not files and (out is not None or json or certificate is not None or write is not None):
+        raise typer.BadParameter(
+            "are needed with --out, --write, --certificate and --json.", param_hint="'FILE.toml ...'"
+        )
+    if replaces is not None and write is None:
+        raise typer.BadParameter("is for --write.", param_hint="'--replaces'")
     from catseye.api.laboratory import save_triplet_form
 
-    issue = _Issue(certificate, laboratory, job)
+    issue = _Issue(certificate, laboratory, job, replaces)
     result = _reduced(files, out, issue, quiet=quiet) if files else None
     if blank is not None:
         save_triplet_form(blank)
@@ -51,8 +72,10 @@ def triplet(  # noqa: PLR0913 - its options are its command line
         if not quiet:
             say(wrapped("Written to", str(blanks)))
         return
+    records = () if write is None else result.save_records(write)
     files_of = None if out is None else f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"
     written = [("Written to", files_of), ("Certificate", certificate), ("Written to", blanks)]
+    written += [("Record", str(record)) for record in records]
     if len(result.units) == 1 and not json and not quiet:
         say(result.sheet())
         for title, text in written:
@@ -64,11 +87,12 @@ def triplet(  # noqa: PLR0913 - its options are its command line
 
 
 class _Issue(NamedTuple):
-    """Certificate to write, its laboratory and its job."""
+    """Certificate to write, its laboratory and its job; record of the replaced unit."""
 
     certificate: Path | None
     laboratory: Path | None
     job: Path | None
+    replaces: Path | None
 
 
 def _reduced(files: list[Path], out: Path | None, issue: _Issue, *, quiet: bool) -> "TripletsResult":
@@ -79,7 +103,7 @@ def _reduced(files: list[Path], out: Path | None, issue: _Issue, *, quiet: bool)
     require_writable(out, *files, issue.laboratory, issue.job, certificate=issue.certificate)
     progress = ProgressLine(quiet)
     try:
-        result = reduced(*files, laboratory=issue.laboratory, job=issue.job, progress=progress)
+        result = reduced(*files, laboratory=issue.laboratory, job=issue.job, replaces=issue.replaces, progress=progress)
         if out is not None:
             save(result, out, progress=progress, certificate=issue.certificate)
         else:

@@ -2,6 +2,7 @@
 
 import json
 from functools import partial
+from math import asin, cos, pi, tan
 
 import pytest
 
@@ -38,6 +39,11 @@ def test_the_notes_glass_gives_the_notes_numbers(asked):
     assert own["notes_group_index_over_air"] == pytest.approx(1.527077, abs=5e-7)
     assert own["notes_range_constant"] * 1e3 == pytest.approx(-33.4937, abs=5.1e-5)
     assert (own["notes_range_constant"] - own["range_constant"]) * 1e6 == pytest.approx(23.6, abs=0.1)
+    # 5.19 with the air's half wavelength 99.905519 mm (1.30 halved): 2 pi 33.4937/99.905519 by hand
+    assert own["notes_phase_offset"] == pytest.approx(2.0 * 3.141592653589793 * 33.4937 / 99.905519, abs=2e-5)
+    assert own["phase_offset"] == pytest.approx(
+        2.0 * 3.141592653589793 * -own["range_constant"] / 0.099905519, abs=2e-6
+    )
     cost = found["others"]["N-BK7"]
     assert cost["range_too_long_about_face"] * 1e6 == pytest.approx(0.44, abs=0.005)
     text = asked("BK7-old", "--height-mm", 38.4)[1]
@@ -62,6 +68,16 @@ def test_the_range_constant_at_minus_20_is_that_of_the_shrunk_prism(asked):
     assert own["range_constant"] + (n - 1.0 / n) * 0.0381 == pytest.approx(9.44e-6, abs=5e-8)
     assert own["reference_depth"] == pytest.approx(h / n, abs=1e-12)
     assert own["range_constant_per_c"] == pytest.approx(-0.30e-6, abs=5e-9)
+
+
+def test_the_point_about_which_a_turn_leaves_the_range_lies_higher_by_the_square_of_the_indices_difference(asked):
+    """By hand h (2 n_p - n_g)/n_p^2 = h/n_g - h (n_g - n_p)^2/(n_g n_p^2): 2.9 um higher in a 38.1 mm prism."""
+    own = json.loads(asked("N-BK7", "--json")[1])["prism"]
+    n_p, n_g = own["phase_index_over_air"], own["group_index_over_air"]
+    higher = own["height_at_temperature"] * (n_g - n_p) ** 2 / (n_g * n_p**2)
+    assert own["reference_depth"] - own["flat_depth"] == pytest.approx(higher, rel=1e-6)
+    assert higher == pytest.approx(2.9e-6, abs=0.1e-6)
+    assert f"{1e3 * own['flat_depth']:.4f} mm changes no range" in " ".join(asked("N-BK7")[1].split())
 
 
 def test_the_wavelength_is_in_vacuum_as_the_help_says(asked):
@@ -134,3 +150,25 @@ def test_metres_typed_as_millimetres_are_refused_by_command_and_call(asked):
     assert "--height-mm = 0.0381 is not a prism's height (expected 1 to 1000)" in err
     with pytest.raises(ArgumentError, match=r"^height_mm = 0\.0381 is not"):
         catseye_glass("N-BK7", height_mm=0.0381)
+
+
+def test_a_prism_in_the_back_of_a_mirror_has_the_constant_of_its_geometry(asked):
+    """Unfolded slab: half the group path to a plane through the mirror's face, by Snell, at 0 and 30 degrees."""
+    status, out, err = asked("BK7-old", "--height-mm", 12.7, "--plate-mm", 20, "--json")
+    assert (status, err) == (0, "")
+    answer = json.loads(out)
+    plate, body = answer["plate"], answer["prism"]
+    assert plate["notes_range_constant"] == pytest.approx(0.6061e-3, abs=5e-8)
+    height, n, group = 0.0127, body["phase_index_over_air"], body["group_index_over_air"]
+    assert plate["range_constant"] == pytest.approx(0.020 - group * height, abs=1e-12)
+    inside = asin(0.5 / n)
+    through = group * height / cos(inside) - height * tan(inside) * 0.5
+    oblique = 0.020 * cos(pi / 6.0) - through  # to be added to the measured length
+    assert plate["change_at_30_deg"] == pytest.approx(oblique - plate["range_constant"], abs=1e-9)
+    assert "+0.6007 mm from" in asked("BK7-old", "--height-mm", 12.7, "--plate-mm", 20)[1]
+
+
+def test_a_plate_that_is_none_or_has_no_glass_is_wrong_usage(asked):
+    assert asked("BK7-old", "--plate-mm", 0)[0] == 2
+    assert asked("--plate-mm", 20)[0] == 2
+    assert json.loads(asked("BK7-old", "--json")[1])["plate"] is None

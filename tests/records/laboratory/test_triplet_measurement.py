@@ -167,6 +167,7 @@ def test_readings_of_the_flip_repeat_those_before_it_where_there_are_none():
         ('air_model = "rueger1990"', 'air_model = "edlen"', "air_model = 'edlen' (expected"),
         ("measured_on = 2003-05-14", "", "measured_on is missing"),
         ("[ball]", "[ball]\nr3_mm = 1.0", "ball.r3_mm = 1.0 is not a known key"),
+        ("[ball]", "[ball]\nspacer_mm = 1.0", "ball.spacer_mm = 1.0 is not a known key (expected in another table)"),
         ("phi_2_rad = 3.184779218", 'phi_2_rad = "3.18"', "placement[0].phi_2_rad = '3.18' (expected a number)"),
     ],
 )

@@ -22,7 +22,6 @@ from catseye.reduction.triplet.use import (
     incidence_on_prisms,
     median,
     obliquity_by_tilt,
-    scan_points_from_balls,
 )
 
 seeds = st.integers(0, 2**32 - 1)
@@ -264,24 +263,9 @@ def test_a_units_sheet_places_it_as_the_campaign_does(night_01):
         assert np.cross(u.normal, u.axis) @ u.across == pytest.approx(1.0, abs=1e-12)
 
 
-def test_scan_points_follow_from_balls():
-    rng = np.random.default_rng(4)
-    units = [unit(str(i), ball=np.array(b)) for i, b in enumerate(rng.normal(size=(5, 3)) * [30, 30, 5])]
-    s = rng.normal(size=(2, 3)) * 5 + [0.0, 0.0, 60.0]
-    d = np.stack([ranged(u, s) for u in units])
-    d[2, 0] = np.nan
-    ranges = ball_ranges(units, s, d, covariance=1e-10 * np.eye(20))
-    balls = np.stack([u.ball for u in units])
-    found = scan_points_from_balls(s + 0.01, balls, ball_covariance=1e-10 * np.eye(15), ranges=ranges)
-    np.testing.assert_allclose(found.require_converged().x[:6].reshape(2, 3), s, rtol=0, atol=1e-9)
-
-
 def test_what_does_not_fit_is_refused():
     u = unit()
     with pytest.raises(ValidityError, match="triplet TR: normal and axis are not square unit vectors"):
         replace(u, axis=u.normal)
     with pytest.raises(InputError, match=r"expected \(1, 3, 2\) and \(6, 6\) for 1 triplets and 3 scan points"):
         ball_ranges([u], np.zeros((3, 3)), np.zeros((3, 2)), covariance=np.eye(6))
-    ranges = ball_ranges([u], before(u, np.random.default_rng(0), k=1), np.full((1, 1, 2), 60.0), covariance=np.eye(2))
-    with pytest.raises(InputError, match=r"expected \(1, 3\), \(1, 3\)"):
-        scan_points_from_balls(np.zeros(3), np.zeros((1, 3)), ball_covariance=np.eye(3), ranges=ranges)

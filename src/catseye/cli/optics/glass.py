@@ -10,6 +10,7 @@ from catseye.cli.results import tell
 
 @app.command(
     epilog="\b\nExample: catseye glass BK7-old --height-mm 38.4\n"
+    "Example: catseye glass BK7-old --height-mm 12.7 --plate-mm 20\n"
     "Example: catseye glass fused-silica --wavelength-um 0.85 --temperature-c=-10"
 )
 def glass(
@@ -20,9 +21,16 @@ def glass(
         float,
         typer.Option("--height-mm", help="Height of a prism of it at 20 °C, face to corner, mm."),
     ] = 38.1,
+    plate_mm: Annotated[
+        float | None,
+        typer.Option("--plate-mm", help="From the face of a mirror to the face of the prism in its back, mm."),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Indices of a glass, a prism of it, and errors of another glass."""
     from catseye.api.optics import glass as glass_of
 
-    tell(glass_of(name, wavelength_um=wavelength_um, temperature_c=temperature_c, height_mm=height_mm), json=json)
+    result = glass_of(
+        name, wavelength_um=wavelength_um, temperature_c=temperature_c, height_mm=height_mm, plate_mm=plate_mm
+    )
+    tell(result, json=json)

@@ -25,6 +25,7 @@ def glass_object(state: "GlassState") -> dict[str, Any]:
         "expansion_per_c": glass.expansion,
         "prism": dict(vars(state.prism)),
         "others": {name: None if cost is None else dict(vars(cost)) for name, cost in state.others.items()},
+        "plate": None if state.plate is None else dict(vars(state.plate)),
     }
 
 
@@ -45,8 +46,10 @@ def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
         ("expansion", f"{answer['expansion_per_c'] * 1e6:.1f} ppm per °C"),
         ("prism", f"{body['height'] * 1e3:g} mm high at 20 °C, here at {answer['temperature_c']:g} °C in air of "
                   f"{body['air']}: range constant "
-                  f"{body['range_constant'] * 1e3:.4f} mm ({body['range_constant_per_c'] * 1e6:+.2f} µm per °C), point "
-                  f"{body['reference_depth'] * 1e3:.4f} mm below the face, "
+                  f"{body['range_constant'] * 1e3:.4f} mm ({body['range_constant_per_c'] * 1e6:+.2f} µm per °C), φ_ic "
+                  f"{body['phase_offset']:.6f} rad at 1500 MHz, point "
+                  f"{body['reference_depth'] * 1e3:.4f} mm below the face (a small turn about "
+                  f"{body['flat_depth'] * 1e3:.4f} mm changes no range), "
                   f"{body['range_change_at_30_deg'] * 1e6:+.2f} µm more at 30°"),
         ("the notes", f"take {answer['wavelength_um']:g} µm as in air: phase index {answer['notes_phase_index']:.8f}, "
                       f"group index {answer['notes_group_index']:.8f}, modulation "
@@ -57,6 +60,15 @@ def glass_rows(answer: dict[str, Any]) -> list[tuple[str, str]]:
                       f"{body['notes_range_constant'] * 1e3:.4f} mm, "
                       f"{(body['notes_range_constant'] - body['range_constant']) * 1e6:+.1f} µm"),
     ]  # fmt: skip
+    plate = answer["plate"]
+    if plate is not None:
+        text = (
+            f"{plate['thickness'] * 1e3:g} mm from its face to the prism in its back: the face is "
+            f"{plate['range_constant'] * 1e3:+.4f} mm from the measured length, "
+            f"at 30° {plate['change_at_30_deg'] * 1e6:+.2f} µm more; by the notes "
+            f"{plate['notes_range_constant'] * 1e3:+.4f} mm"
+        )
+        rows.append(("mirror", text))
     for glass, cost in answer["others"].items():
         text = "formula not valid at this wavelength"
         if cost is not None:

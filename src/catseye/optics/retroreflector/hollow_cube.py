@@ -69,7 +69,7 @@ class HollowCube:
         """Returned share: clear area over the opening's, times three mirrors."""
         return self.clear_area(incidence, azimuth) / (np.pi * self.aperture**2) * self.reflectance**3
 
-    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+    def sectors(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Sectors:
         """Six sectors of mirrors that reflect s and p equally.
 
         `corner_polarization.hollow_corner` has real metal.

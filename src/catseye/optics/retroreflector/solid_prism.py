@@ -137,7 +137,7 @@ class SolidPrism:
         area = self.clear_area(angle, turn) / (np.pi * self.aperture**2)
         return area * (1.0 - reflected) ** 2 * self._corner(np.minimum(angle, RIGHT), turn)
 
-    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+    def sectors(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Sectors:
         """Six sectors; coatings reflect s and p equally.
 
         See `corner_polarization.Corner` for real films.

@@ -163,7 +163,7 @@ def refractivity_slopes(
 
     temperature_c, pressure_hpa, humidity_percent   deg C, hPa, %
 
-    Source: [GOLDMAN00] D.4, by the formula that it used, [RUEGER90], relative humidity held: `SLOPES` at 20 deg C.
+    Source: [GOLDMAN00] eq. D.4, by the formula that it used, [RUEGER90], relative humidity held: `SLOPES` at 20 deg C.
 
     >>> [round(s * 1e6, 6) for s in refractivity_slopes()]
     [-0.895887, 0.272048, -0.009606]

@@ -1,4 +1,7 @@
-"""Calibration of a triplet unit: H_corr with uncertainty, and acceptance."""
+"""Calibration of a triplet unit: H_corr with uncertainty, and acceptance.
+
+Source: [GOLDMAN00] sections 1.2 and 1.3, eq. D.1 for the ratio of the indices.
+"""
 
 import math
 from dataclasses import dataclass, replace

@@ -28,8 +28,6 @@ from numpy.typing import ArrayLike
 from catseye.aliases import Array
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.least_squares.adjustment import LeastSquaresSolution, adjust
-from catseye.estimation.observations.kinds import Distances, ObservedCoordinates
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.records.site.triplet import TripletRecord
@@ -297,41 +295,3 @@ def _parts(sight: ArrayLike, offset: ArrayLike) -> tuple[Array, Array]:
     """Offset along the sight, and its square length."""
     e, v = np.asarray(sight, dtype=float), np.asarray(offset, dtype=float)
     return np.sum(e * v, axis=-1), np.sum(v * v, axis=-1)
-
-
-def scan_points_from_balls(
-    start: ArrayLike, balls: ArrayLike, *, ball_covariance: ArrayLike, ranges: BallRanges
-) -> LeastSquaresSolution:
-    """Feed-arm scan points from the balls and distances.
-
-    The memo's third step.
-
-    start             (k, 3) m, approximate scan points
-    balls             (n, 3) m, ground coordinates of the balls' centres
-    ball_covariance   (3n, 3n) m^2 of these
-    ranges            distances n by k with their covariance; NaN for missing ones
-
-    Returns a Solution over the scan points (3k) and then the balls (3n), which the distances improve a little.
-
-    Source: [GOLDMAN00] section 1.1, steps 1 to 3; the estimate is generalised least squares, [FOERSTNER16] chapter 4.
-    """
-    s, b = np.asarray(start, dtype=float), np.asarray(balls, dtype=float)
-    n, k = ranges.d_bc.shape
-    if s.shape != (k, 3) or b.shape != (n, 3):
-        raise InputError(
-            f"scan points {s.shape} and balls {b.shape} for {n} by {k} distances: expected ({k}, 3), ({n}, 3)"
-        )
-    used = np.flatnonzero(np.isfinite(ranges.d_bc.ravel()))
-    unit, ranger = np.divmod(used, k)
-    first = 3 * k
-    groups = (
-        ObservedCoordinates.of_points("balls", b, np.asarray(ball_covariance, dtype=float), first + 3 * np.arange(n)),
-        Distances(
-            "ball distances",
-            ranges.d_bc.ravel()[used],
-            ranges.covariance[np.ix_(used, used)],
-            3 * ranger,
-            first + 3 * unit,
-        ),
-    )
-    return adjust(np.concatenate([s.ravel(), b.ravel()]), groups)

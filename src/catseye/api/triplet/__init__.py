@@ -1,0 +1,1 @@
+"""Triplet units in use: `triplets reduce`, `bound`, `aim`, `adjust`; records of measured units."""
