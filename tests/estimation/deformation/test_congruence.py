@@ -9,12 +9,11 @@ from catseye.errors import EstimationError
 from catseye.estimation.deformation.congruence import (
     Epochs,
     VarianceFactor,
-    congruence_test,
     differences,
     pooled_variance_factor,
 )
 from draws import draws
-from epoch_scene import FIELD, SIGMA, movement
+from epoch_scene import FIELD, SIGMA, congruence_test, movement
 
 
 def test_the_congruence_test_is_that_of_one_adjustment_of_both_epochs():

@@ -15,7 +15,7 @@ from catseye.errors import EstimationError, InputError
 from catseye.geometry.antenna.deformation import TelescopePosture
 from catseye.records.site.structural_model import StructuralModel, read_structural_model, structural_model_toml
 from catseye.reduction.structure.antenna import UNITS, antenna_of
-from catseye.reduction.structure.corrections import MeasuredPosture, correct_posture, frame_motion, measured_of
+from catseye.reduction.structure.corrections import MeasuredPosture, correct_posture, frame_motion
 from catseye.reduction.structure.fit import fit_model, updated_model
 from repository import ROOT
 
@@ -270,32 +270,8 @@ def test_undetermined_coefficients_are_named(antenna):
         fit_model(antenna, epochs, free={"feed_arm": ["shift"]})
     with pytest.raises(EstimationError, match="needs 3 points"):
         frame_motion(antenna, epochs[0], "subreflector")
-
-
-def test_targets_are_taken_from_a_coordinates_file_with_their_covariance(antenna):
-    rng = np.random.default_rng(12)
-    q = mixed(rng, 3)
-    order = [f"{name} {axis}" for name in ("ZEG41040L", "OTHER", "TR01") for axis in "xyz"]
-    points = {name: {"x": float(i), "y": 2.0, "z": 3.0} for i, name in enumerate(("ZEG41040L", "OTHER", "TR01"))}
-    document = {"points": points, "covariance_order": order, "covariance": q.tolist()}
-    found = measured_of(document, antenna, POSTURE)
-    assert found.names == ("TR01", "ZEG41040L")
-    np.testing.assert_array_equal(found.coordinates[:, 0], [2.0, 0.0])
-    at = [6, 7, 8, 0, 1, 2]
-    np.testing.assert_array_equal(found.covariance, q[np.ix_(at, at)])
-    with pytest.raises(InputError, match="'covariance' is missing"):
-        measured_of({"points": points, "covariance_order": order}, antenna, POSTURE)
-    with pytest.raises(InputError, match="covariance_order has no 'TR01 x'"):
-        measured_of(document | {"covariance_order": order[:6]}, antenna, POSTURE)
-    with pytest.raises(InputError, match=r"covariance has shape \(9, 8\)"):
-        measured_of(document | {"covariance": q[:, :8].tolist()}, antenna, POSTURE)
-    for lost in ({"x": None, "y": 2.0, "z": 3.0}, {"x": 1.0}):  # a point without coordinates is null in JSON
-        with pytest.raises(InputError, match="TR01 has no x, y and z"):
-            measured_of(document | {"points": points | {"TR01": lost}}, antenna, POSTURE)
     with pytest.raises(EstimationError, match="no target was measured"):
         correct_posture(antenna, MeasuredPosture((), np.zeros((0, 3)), np.zeros((0, 0)), POSTURE))
-    with pytest.raises(InputError, match="none of their points"):
-        measured_of(document | {"points": {"OTHER": points["OTHER"]}}, antenna, POSTURE)
 
 
 def test_a_group_with_a_motion_of_its_own_is_corrected_too(tmp_path):

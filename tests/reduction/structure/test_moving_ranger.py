@@ -15,12 +15,11 @@ from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.structural_model import read_structural_model
 from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
-from catseye.reduction.structure.antenna import SubreflectorPosition, antenna_of
+from catseye.reduction.structure.antenna import antenna_of
 from catseye.reduction.structure.moving_ranger import (
     Driven,
     FrameCorrections,
     moving_ranger,
-    projected,
     tracked,
     vibrating,
 )
@@ -154,29 +153,6 @@ def check(errors, claimed):
     np.testing.assert_allclose(sample, claimed / np.outer(sigma, sigma), rtol=0, atol=4 * np.sqrt(2 / COUNT))
 
 
-@pytest.mark.parametrize("group", ["bearings", "rim", "arm", "subreflector_rim"])
-def test_projected_targets_scatter_as_their_covariance_claims(antenna, group):
-    rng = np.random.default_rng(2)
-    state = swinging(antenna)
-    now = np.array([100.0])
-    found = projected(antenna, group, DRIVE, times=now, known=(vibrating(antenna.record, state, now),))
-    assert found.position.shape == (1, len(antenna.groups[group].names), 3)
-    moved, added = draws(antenna, rng, state)
-    posture = moved.posture(np.full(COUNT, 100.0))
-    here = antenna.in_frame(group, posture)[:, 0] + antenna.u_points(group)[0] * rng.standard_normal((COUNT, 3))
-    points = antenna.ground_from(antenna.groups[group].frame, posture, added=added).points(here)
-    check(points - found.position[0, 0], found.covariance[0, 0])
-
-
-def test_projected_coordinates_at_both_ends_of_a_buffer_are_the_models(antenna):
-    told = SubreflectorPosition(np.array([0.0, 0.01, 0.0]), np.array([0.0, 0.001, 0.0]), np.zeros(3))
-    found = projected(antenna, "subreflector_rim", DRIVE, times=TIMES, subreflector=told)
-    expected = antenna.points("subreflector_rim", DRIVE.posture(TIMES), subreflector=told)
-    np.testing.assert_array_equal(found.position, expected)
-    assert found.covariance.shape == (2, 4, 3, 3)
-    assert np.all(np.linalg.eigvalsh(found.covariance) > 0)
-
-
 def test_the_encoders_uncertainty_moves_and_turns_the_mount_together(antenna, mirror):
     """By differences of the whole model: what an encoder's u adds is its slope times u, shift and turn in one."""
     now, h, u = np.array(100.0), 1e-5, 1e-3
@@ -247,31 +223,6 @@ def test_strangers_are_refused(antenna, mirror):
         moving_ranger(RANGER, mirror, antenna, drive=DRIVE, times=1000.0, u_mount=1e-5)
     assert DRIVE.posture(100.0).temperature_c == 3.0
     assert isinstance(DRIVE.posture(TIMES), TelescopePosture)
-
-
-def test_points_on_the_alidade_do_not_follow_the_elevation_encoder(tmp_path):
-    more = """
-[[frame]]
-name = "tower"
-parent = "alidade"
-origin_mm = [0.0, -20000.0, 1000.0]
-
-[[group]]
-name = "on_tower"
-frame = "tower"
-
-[[group.point]]
-name = "TW1"
-position_mm = [0.0, 0.0, 1000.0]
-u_position_mm = 1.0
-"""
-    path = tmp_path / "tower.toml"
-    path.write_text(EXAMPLE.read_text(encoding="utf-8") + more, encoding="utf-8")
-    model = antenna_of(read_structural_model(path))
-    still, loose = (
-        projected(model, "on_tower", replace(DRIVE, u_elevation=u), times=TIMES).covariance for u in (0.0, 1e-3)
-    )
-    np.testing.assert_array_equal(loose, still)
 
 
 def test_an_arm_tracked_by_ground_rangers_is_predicted_as_by_a_detector(antenna, mirror):

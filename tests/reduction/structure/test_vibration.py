@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import InputError
-from catseye.reduction.structure.vibration import RangeSeries, difference, movements, vibration
+from catseye.reduction.structure.vibration import RangeSeries, difference, vibration
 from catseye.simulator.night.faults import Streams
 from catseye.simulator.twin.air import LivingAir
 from catseye.simulator.twin.conditions import LIVING_NIGHT, LivingPlanted
@@ -149,26 +149,6 @@ def test_interpolation_passes_the_stated_power():
     power = np.var(found.ranges) / np.var(moving.ranges)
     assert power == pytest.approx(1.0 - 2 * part * (1 - part) * (1 - np.cos(2 * np.pi * f / RATE)), rel=2e-3)
     assert found.u[10] == pytest.approx(U * np.sqrt(1.0 + part**2 + (1 - part) ** 2), rel=1e-6)
-
-
-def test_movements_are_the_twins_to_their_claimed_uncertainty(twin):
-    """Approximate directions, 0.3 m off at the target, and exact truth from the simulator's bodies."""
-    rng = np.random.default_rng(5)
-    series = [measured(twin, r, phase=0.0, rng=rng, seconds=200.0) for r in RANGERS]
-    t = series[0].seconds
-    series = [RangeSeries(s.ranger, s.target, t, s.ranges - 3e-4 * np.sin(t / 200.0), s.u, WINDOW) for s in series]
-    roughly = place(twin, np.zeros(1))[0] + [0.2, -0.2, 0.1]
-    e = np.array([roughly - np.array(RANGERS[s.ranger]) for s in series])
-    found = movements(series, e / np.linalg.norm(e, axis=1)[:, None])
-    parts = (np.arange(9) - 4) / 9 * WINDOW
-    true = place(twin, (t[:, None] + parts).ravel()).reshape(len(t), 9, 3).mean(axis=1)
-    off = found.x - (true - true.mean(axis=0))
-    chi = np.einsum("ni,nij,nj->n", off, np.linalg.inv(found.covariance), off)
-    assert np.mean(chi) == pytest.approx(3.0, rel=0.1)
-    with pytest.raises(InputError, match="one plane"):
-        movements(series[:3], np.array([[1.0, 0, 0], [0, 1, 0], [1, 1, 0]]))
-    with pytest.raises(InputError, match="at least three"):
-        movements(series[:2], e[:2])
 
 
 def test_series_too_short_or_apart_are_refused():

@@ -150,6 +150,7 @@ class IndexModel:
     source                 the bibliography's keys
     dispersion             of each gas
     densities              function of (temperature_c, pressure_hpa, vapour_pressure_hpa) giving each gas's factor
+    density_unit           of those factors
     density_slopes         function of the same giving each factor's DensitySlopes
     vapour_formula         the saturation formula it goes with, a name in `atmosphere.weather.humidity.FORMULAS`
     standard_uncertainty   of the formula in the group index of dry air, exact weather; the minimum
@@ -174,6 +175,7 @@ class IndexModel:
     co2_slope: float = 0.0
     vapour_uncertainty: float = 0.0
     standard: "IndexModel | None" = None
+    density_unit: str = "hPa/K"
     is_compiled: bool = False
 
     def check(self, **arguments) -> None:

@@ -104,39 +104,6 @@ def pointing_offset(curvature_, length):
     return 0.5 * np.asarray(curvature_, float) * np.asarray(length, float)
 
 
-def length_excess(curvature_, length):
-    """Length of the ray less its chord, m, first term.
-
-    Also the bound where the curvature is nowhere larger.
-
-    curvature_   of the ray, 1/m
-    length       of the chord, m
-
-    Source: derived at the top of this file, kappa² d³/24; `atmosphere.sound.velocity.arc_to_chord_correction` removes
-    it.
-
-    >>> round(float(length_excess(1e-6, 120.0)) * 1e6, 3)
-    0.072
-    """
-    return np.asarray(curvature_, float) ** 2 * np.asarray(length, float) ** 3 / 24.0
-
-
-def optical_excess(curvature_, length, *, group_share=1.0):
-    """Optical path along the ray less that along its chord, m, first term.
-
-    curvature_    of the ray, 1/m
-    length        of the chord, m
-    group_share   gradient of the group index over that of the phase index where the modulation is counted: 1.02 at
-                  0.78 um; 1 for the light itself
-
-    Source: derived at the top of this file: kappa² d³/24 (1 - 2 share).
-
-    >>> round(float(optical_excess(1e-6, 120.0)) * 1e6, 3)
-    -0.072
-    """
-    return length_excess(curvature_, length) * (1.0 - 2.0 * np.asarray(group_share, float))
-
-
 def excess_bound(gradient, length):
     """Bound on the optical path deficit of a ray against its chord, m.
 

@@ -29,7 +29,7 @@ def _pivot(text: str | None) -> str | None:
 
 @app.command(
     epilog="\b\nExample: catseye structure at-15 at-30 at-45 at-60 at-75 at-85 --points 'DP*' --predict 50 --out dish\n"
-    "         catseye structure --epochs epochs.csv --points 'ZEG*' --harmonics 2 --hysteresis --out feed-arm\n"
+    "         catseye structure --epochs examples/structure/epochs.csv --points 'ZEG*' --predict 50 --out feed-arm\n"
     "         catseye structure --vibration night.db --points ZEG41040L --out shaking\n"
     "at-15: catseye night night-15 --elevation-deg 15; catseye reduce night-15 --out at-15; the others likewise"
 )

@@ -1,1 +1,1 @@
-"""Movements between epochs: congruence tests, comparison, group motions."""
+"""Movements between epochs: congruence tests, comparison."""

@@ -359,27 +359,13 @@ def _aligned(
     return y, turned
 
 
-def congruence_test(epochs: Epochs, *, datum: str = "rigid", variance_factor: VarianceFactor = KNOWN) -> CongruenceTest:
-    """Global test that no common point moved relative to the others.
+def global_test(pvv: float, degrees: int, variance_factor: VarianceFactor) -> CongruenceTest:
+    """Test that a sum of squares with its degrees of freedom is zero but for noise.
 
-    epochs            see `Epochs`
-    datum             allowed differences of the two datums, a key of `DATUMS`
-    variance_factor   known (chi-square test) or estimated (F test), see `pooled_variance_factor`
-
-    The quadratic form of the differences d with the pseudo-inverse of their covariance, after both are brought to one
-    datum; here d' P d with P as in `best_linear_estimate`, which is the same for every datum. Raises EstimationError
-    without redundancy, or if the covariance is singular beyond the datum.
+    For two epochs, pvv is the quadratic form of their differences with the pseudo-inverse of the covariance, both in
+    one datum: `Differences.fit`, the same for every datum. Raises EstimationError without a degree of freedom.
 
     Source: [PELZER71]; [CASPARY87].
-    """
-    fit = differences(epochs, datum, np.ones(len(epochs.names), dtype=bool)).fit()
-    return global_test(fit.pvv, fit.degrees_of_freedom, variance_factor)
-
-
-def global_test(pvv: float, degrees: int, variance_factor: VarianceFactor) -> CongruenceTest:
-    """Test of a sum of squares with its degrees of freedom.
-
-    EstimationError if there are none.
     """
     if degrees <= 0:
         raise EstimationError(

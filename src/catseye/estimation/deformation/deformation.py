@@ -76,16 +76,14 @@ def detectable_displacement(
     datum: str = "rigid",
     level: float = 0.05,
     power: float = 0.8,
-    single: bool = False,
     variance_factor: VarianceFactor = KNOWN,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest displacement (n,) m of each point that a test detects, and its direction (n, 3).
+    """Smallest displacement (n,) m of each point that the congruence test detects, and its direction (n, 3).
 
     epochs            see `Epochs`; for planning, the second epoch may repeat the first's coordinates
-    datum             allowed differences of the two datums, as `congruence_test`
+    datum             allowed differences of the two datums, a key of `congruence.DATUMS`
     level             of the test
     power             probability of detection
-    single            False: the congruence test of all points; True: the test of that point alone, at level / points
     variance_factor   known or estimated
 
     The direction is the weakest one. A point that the others do not check has nan. All other points are taken as
@@ -95,13 +93,7 @@ def detectable_displacement(
     """
     search = DeletionSearch(differences(epochs, datum, np.ones(len(epochs.names), dtype=bool)), variance_factor)
     global_test(search.pvv, search.degrees, variance_factor)
-    if not single:
-        return search.detectable(variance_factor.noncentrality(search.degrees, level, power))
-    ranks = np.array([len(rows) for rows in search.rows])
-    unit, direction = search.detectable(1.0)
-    single_level = level / max(int(np.isfinite(unit).sum()), 1)
-    needed = {int(r): variance_factor.noncentrality(int(r), single_level, power) for r in set(ranks[np.isfinite(unit)])}
-    return unit * np.sqrt([needed.get(int(r), np.nan) for r in ranks]), direction
+    return search.detectable(variance_factor.noncentrality(search.degrees, level, power))
 
 
 def moved_points(
@@ -117,7 +109,7 @@ def moved_points(
     """Common points that moved, with displacements, covariances and tests.
 
     epochs            see `Epochs`
-    datum             allowed differences of the two datums, as `congruence_test`
+    datum             allowed differences of the two datums, a key of `congruence.DATUMS`
     level             probability of any false alarm if no point moved
     power             of the detectable displacement
     rule              "global": remove points until the congruence test of the remainder passes. "local": until no

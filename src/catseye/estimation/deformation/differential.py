@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from catseye.errors import EstimationError
 from catseye.estimation.shapes.rigid_body import motion_columns
@@ -40,8 +39,10 @@ class GroupMovements:
     sensitivity_stations    (..., 3n, 3s) d displacement / d approximate stations
     resolution              (..., 3n, 3n) H, response to a small true movement; (H - 1) times a movement that violates
                             the constraint is its bias
+    common                  (..., c) estimates of the common errors, in their standard uncertainties
+    common_covariance       (..., c, c)
     residual                (..., n, s) m, observed minus predicted change; nan for missing channels
-    pvv                     (...) weighted sum of squares
+    pvv                     (...) weighted sum of squares, the common errors' own among them
     degrees_of_freedom      (...) channels less parameters
     rank                    (...) of q
     status                  (...) text: "determined", or the reason why not
@@ -58,6 +59,8 @@ class GroupMovements:
     sensitivity_points: np.ndarray
     sensitivity_stations: np.ndarray
     resolution: np.ndarray
+    common: np.ndarray
+    common_covariance: np.ndarray
     residual: np.ndarray
     pvv: np.ndarray
     degrees_of_freedom: np.ndarray
@@ -87,50 +90,6 @@ def change_of_range(stations: np.ndarray, points: np.ndarray, displacement: np.n
     step = np.asarray(displacement, dtype=float)[..., None, :]
     total = np.linalg.norm(arm, axis=-1) + np.linalg.norm(arm + step, axis=-1)
     return np.sum((2.0 * arm + step) * step, axis=-1) / total
-
-
-def displacements(
-    approximate_stations: np.ndarray,
-    approximate_points: np.ndarray,
-    range_changes: np.ndarray,
-    *,
-    sigma: np.ndarray | float,
-    u_stations: np.ndarray | float = 0.0,
-    u_points: np.ndarray | float = 0.0,
-) -> GroupMovements:
-    """Movement of single points from changes of their ranges.
-
-    The result has the arrays of groups of one point (..., 1, 3).
-
-    approximate_stations   (s, 3) m
-    approximate_points     (..., 3) m, before the movement
-    range_changes          (..., s) m, after less before; nan where missing
-    sigma                  (..., s) or less, m: standard uncertainty of a change; inf or nan leaves it out
-    u_stations             m, standard uncertainty of a station's coordinates: one value, (s,) or (s, 3)
-    u_points               m, likewise of the point: one value or (3,)
-
-    Points, changes and sigma broadcast against each other. Three channels not in one plane determine a point. The
-    uncertainty from the approximate coordinates is first order in them, and grows with the movement; it is the same
-    error in every epoch: propagate it between epochs with the sensitivities. Weights are those of the noise alone.
-
-    Source: [PARKER04] 3.2.4; exact differences and error budget are ours.
-
-    >>> stations = np.array([[50.0, 0, 0], [0, 50, 0], [0, 0, 50], [-30, -30, -30]])
-    >>> truth = np.array([0.001, -0.002, 0.003])
-    >>> changes = change_of_range(stations, np.zeros(3), truth)
-    >>> displacements(stations, np.zeros(3), changes, sigma=1e-5).displacement[0].round(12)
-    array([ 0.001, -0.002,  0.003])
-    """
-    points = np.asarray(approximate_points, dtype=float)
-    return constrained(
-        approximate_stations,
-        points[..., None, :],
-        np.asarray(range_changes, dtype=float)[..., None, :],
-        sigma=np.asarray(sigma, dtype=float) if np.ndim(sigma) < 2 else np.asarray(sigma, dtype=float)[..., None, :],
-        basis=np.eye(3),
-        u_stations=u_stations,
-        u_points=u_points,
-    )
 
 
 def allowed_directions(
@@ -166,7 +125,7 @@ def rigid_group(points: np.ndarray, motions: Sequence[int] = range(6), pivot: np
     return motion_columns(points, centre)[:, list(motions)]
 
 
-def constrained(
+def constrained(  # noqa: PLR0913 - places, changes, and what is known of each
     approximate_stations: np.ndarray,
     approximate_points: np.ndarray,
     range_changes: np.ndarray,
@@ -176,6 +135,7 @@ def constrained(
     u_stations: np.ndarray | float = 0.0,
     u_points: np.ndarray | float = 0.0,
     u_violation: float = 0.0,
+    common: np.ndarray | None = None,
 ) -> GroupMovements:
     """Movements of a group of points restricted to a linear subspace.
 
@@ -187,43 +147,53 @@ def constrained(
     u_stations, u_points   m, standard uncertainty of approximate coordinates: one value, (s,) and (n,), or with 3
     u_violation            m, standard uncertainty of movement in each excluded direction: an unknown bias in the
                            budget, not in the weights
+    common                 broadcasts to (..., n, s, c), m: effect on each channel of one standard uncertainty of c
+                           errors that channels share, such as the air's; estimated, each with a prior of one
 
-    The gain by the constraint shows in the covariance compared with that of `displacements`; the error if it is
-    violated, in `bias`; its validity, in `constraint_test`. Raises EstimationError for wrong shapes, a basis with
-    linearly dependent columns, or a point that coincides with a station.
+    The gain by the constraint shows in the covariance compared with that of free points, `basis` the unit matrix; the
+    error if it is violated, in `bias`. Raises EstimationError for wrong shapes, a basis with linearly dependent
+    columns, or a point that coincides with a station.
 
-    Source: [PARKER04] 3.2.5; [FOERSTNER16] chapter 4 (Gauss-Markov model with constraints, here by elimination).
+    Source: [PARKER04] 3.2.4 and 3.2.5, exact differences and error budget ours; [FOERSTNER16] chapter 4 (Gauss-Markov
+    model with constraints, here by elimination).
     """
     stations, points, changes, weight, basis = _checked(
         approximate_stations, approximate_points, range_changes, sigma, basis
     )
     batch, (n, s), q = changes.shape[:-2], changes.shape[-2:], basis.shape[1]
     available = weight > 0.0
-    theta, size = np.zeros((*batch, q)), np.full(batch, np.inf)
+    shared = np.zeros((*batch, n, s, 0)) if common is None else np.asarray(common, dtype=float)
+    shared = np.where(available[..., None], np.broadcast_to(shared, (*batch, n, s, shared.shape[-1])), 0.0)
+    c = shared.shape[-1]
+    prior = np.diag(np.concatenate([np.zeros(q), np.ones(c)]))
+    theta, size = np.zeros((*batch, q + c)), np.full(batch, np.inf)
     limit = STEP * float(np.linalg.norm(points[..., None, :] - stations, axis=-1).mean())
     for _ in range(ITERATIONS):
-        moved = (theta @ basis.T).reshape(*batch, n, 3)
-        residual = np.where(available, changes - change_of_range(stations, points, moved), 0.0)
+        moved = (theta[..., :q] @ basis.T).reshape(*batch, n, 3)
+        offset = np.einsum("...nsc,...c->...ns", shared, theta[..., q:])
+        residual = np.where(available, changes - change_of_range(stations, points, moved) - offset, 0.0)
         unit, turned = _directions(stations, points, moved)
-        design = np.einsum("...nsi,niq->...nsq", unit, basis.reshape(n, 3, q)).reshape(*batch, n * s, q)
-        inverse, rank = _inverse(np.swapaxes(design, -1, -2) @ (weight.reshape(*batch, n * s, 1) * design))
+        along = np.einsum("...nsi,niq->...nsq", unit, basis.reshape(n, 3, q))
+        design = np.concatenate([along, shared], axis=-1).reshape(*batch, n * s, q + c)
+        inverse, rank = _inverse(np.swapaxes(design, -1, -2) @ (weight.reshape(*batch, n * s, 1) * design) + prior)
         gain = inverse @ np.swapaxes(design * weight.reshape(*batch, n * s, 1), -1, -2)
-        step = (gain @ residual.reshape(*batch, n * s, 1))[..., 0]
-        size = np.abs(step @ basis.T).max(axis=-1, initial=0.0)
-        if np.all((size < limit) | (rank < q)):
+        step = (gain @ residual.reshape(*batch, n * s, 1))[..., 0] - (inverse @ (prior @ theta[..., None]))[..., 0]
+        size = np.abs(step[..., :q] @ basis.T).max(axis=-1, initial=0.0)
+        if np.all((size < limit) | (rank < q + c)):
             break
-        theta = theta + np.where((rank == q)[..., None], step, 0.0)
-    displacement_gain = basis @ gain  # changes -> displacement
+        theta = theta + np.where((rank == q + c)[..., None], step, 0.0)
+    rank = np.maximum(rank - c, 0)
+    displacement_gain = basis @ gain[..., :q, :]  # changes -> displacement
     approximation, by_points, by_stations = _from_places(displacement_gain, turned, u_stations, u_points)
     resolution = _onto_points(displacement_gain, unit)
     outside = (resolution - np.eye(3 * n)) @ _complement(basis)
-    noise = basis @ inverse @ basis.T
+    noise = basis @ inverse[..., :q, :q] @ basis.T
     violation = u_violation**2 * outside @ np.swapaxes(outside, -1, -2)
     good = (rank == q) & (size < limit)
     channels = available.sum(axis=(-1, -2))
     results = [np.where(good[..., None, None], a, np.nan) for a in (
-        moved, noise + approximation + violation, noise, approximation, violation, inverse, by_points, by_stations,
-        resolution, np.where(available, residual, np.nan),
+        moved, noise + approximation + violation, noise, approximation, violation, inverse[..., :q, :q], by_points,
+        by_stations, resolution, np.where(available, residual, np.nan), inverse[..., q:, q:],
     )]  # fmt: skip
     return GroupMovements(
         displacement=results[0],
@@ -231,14 +201,16 @@ def constrained(
         noise=results[2],
         approximation=results[3],
         violation=results[4],
-        parameters=np.where(good[..., None], theta, np.nan),
+        parameters=np.where(good[..., None], theta[..., :q], np.nan),
         parameters_covariance=results[5],
         basis=basis,
         sensitivity_points=results[6],
         sensitivity_stations=results[7],
         resolution=results[8],
+        common=np.where(good[..., None], theta[..., q:], np.nan),
+        common_covariance=results[10],
         residual=results[9],
-        pvv=np.where(good, np.sum(weight * residual**2, axis=(-1, -2)), np.nan),
+        pvv=np.where(good, np.sum(weight * residual**2, axis=(-1, -2)) + np.sum(theta[..., q:] ** 2, axis=-1), np.nan),
         degrees_of_freedom=np.where(good, channels - q, 0),
         rank=rank,
         status=_statuses(good, rank, channels, q),
@@ -252,22 +224,6 @@ def _statuses(good: np.ndarray, rank: np.ndarray, channels: np.ndarray, count: i
         short = UNDETERMINED.format(rank=rank[tuple(i)], count=count, channels=channels[tuple(i)])
         status[tuple(i)] = short if rank[tuple(i)] < count else NOT_CONVERGED
     return status
-
-
-def constraint_test(restricted: GroupMovements, free: GroupMovements) -> tuple[np.ndarray, np.ndarray]:
-    """Chi-square statistic (...) and p-value (...) of the constraint from `free` to `restricted`.
-
-    restricted, free   movements of the same changes; the basis of the first lies within that of the second
-
-    Raises EstimationError where it does not. Source: [FOERSTNER16] chapter 4 (test of linear hypotheses).
-    """
-    a, b = restricted.basis, free.basis
-    if a.shape[0] != b.shape[0] or a.shape[1] >= b.shape[1]:
-        raise EstimationError(f"bases of shapes {a.shape} and {b.shape}: the first must be a part of the second")
-    if not np.allclose(b @ np.linalg.lstsq(b, a, rcond=None)[0], a, rtol=0.0, atol=1e-9 * np.abs(a).max()):
-        raise EstimationError("the basis of the restricted movements is not a subspace of the free ones")
-    statistic = np.maximum(restricted.pvv - free.pvv, 0.0)
-    return statistic, special.chdtrc(b.shape[1] - a.shape[1], statistic)
 
 
 def _checked(

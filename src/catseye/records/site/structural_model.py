@@ -228,6 +228,7 @@ class StructuralModel(Certificate):
     elevation_deg             least and greatest elevation for which it holds
     temperature_c             least and greatest temperature for which it holds
     reference_temperature_c   temperature at which the thermal terms are zero
+    assumed_temperature_c     of the structure, where nothing else gives it; the reference without
     frame                     frames that move
     group                     groups of points
     vibration                 vibration modes
@@ -238,9 +239,15 @@ class StructuralModel(Certificate):
     elevation_deg: RangeDeg
     temperature_c: RangeC
     reference_temperature_c: Celsius
+    assumed_temperature_c: Celsius | None = None
     frame: Annotated[tuple[FrameRecord, ...], Field(strict=False)]
     group: Annotated[tuple[GroupRecord, ...], Field(strict=False)] = ()
     vibration: Annotated[tuple[VibrationRecord, ...], Field(strict=False)] = ()
+
+    @property
+    def usual_temperature_c(self) -> float:
+        """Temperature of the structure where nothing else gives it."""
+        return self.reference_temperature_c if self.assumed_temperature_c is None else self.assumed_temperature_c
 
     @property
     def moving(self) -> list[FrameRecord | GroupRecord]:
@@ -252,6 +259,12 @@ class StructuralModel(Certificate):
         refuse_narrow(*self.elevation_deg)
         if not self.temperature_c[0] < self.temperature_c[1]:
             raise broken_rule(f"temperature_c = {list(self.temperature_c)} is not increasing")
+        low_c, high_c = self.temperature_c
+        if self.assumed_temperature_c is not None and not low_c <= self.assumed_temperature_c <= high_c:
+            raise broken_rule(
+                f"assumed_temperature_c = {self.assumed_temperature_c:g} is outside temperature_c = {low_c:g} to "
+                f"{high_c:g}, where the model holds"
+            )
         for owner, basis in _bases(self):
             for key, (low, high) in (("elevation_deg", self.elevation_deg), ("temperature_c", self.temperature_c)):
                 knots = getattr(basis, key)

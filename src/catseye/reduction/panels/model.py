@@ -11,6 +11,8 @@ zero    of a gauge in a session; offset: sheet's corrections
 
 All is linear. Errors that placements of one corner share without a parameter (the lean where none was read, the local
 slope of each panel) make their readings correlated: one block per corner.
+
+Source: [PARKER04] chapter 11.
 """
 
 from collections.abc import Mapping

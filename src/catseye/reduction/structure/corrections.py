@@ -11,7 +11,6 @@ Measured coordinates have their full covariance, as in `coordinates.json`; targe
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypedDict
 
 import numpy as np
 
@@ -93,60 +92,6 @@ class Corrections:
     standardised: np.ndarray
     pvv: float
     degrees_of_freedom: int
-
-
-class CoordinatesDocument(TypedDict):
-    """Keys of a `coordinates.json` for a comparison with the model.
-
-    points             name: x, y, z (m) and other keys
-    covariance_order   "ZEG10001 x" and so on, of each row
-    covariance         m^2
-    """
-
-    points: Mapping[str, Mapping[str, object]]
-    covariance_order: Sequence[str]
-    covariance: Sequence[Sequence[float]]
-
-
-def measured_of(
-    document: CoordinatesDocument,
-    antenna: Antenna,
-    posture: TelescopePosture,
-    *,
-    subreflector: SubreflectorPosition | None = None,
-) -> MeasuredPosture:
-    """Model's targets among the points of a `coordinates.json`.
-
-    With their covariance.
-
-    document       the file as read: points, covariance_order, covariance
-    antenna        the structural model
-    posture        of the measurement; a coordinates.json has no temperature
-    subreflector   its commanded position
-
-    Raises InputError where keys or numbers are missing, or no point is in the model.
-    """
-    for key in ("points", "covariance_order", "covariance"):
-        if key not in document:
-            raise InputError(f"coordinates: {key!r} is missing (expected a coordinates.json of `catseye reduce`)")
-    names = tuple(name for group in antenna.groups.values() for name in group.names if name in document["points"])
-    if not names:
-        raise InputError("coordinates: none of their points is in a group of the structural model")
-    order = {label: i for i, label in enumerate(document["covariance_order"])}
-    labels = [f"{name} {axis}" for name in names for axis in "xyz"]
-    missing_labels = [label for label in labels if label not in order]
-    if missing_labels:
-        raise InputError(f"coordinates: covariance_order has no {missing_labels[0]!r} (expected x, y, z of each point)")
-    at = [order[label] for label in labels]
-    full = np.array(document["covariance"], dtype=float)
-    if full.shape != (len(order), len(order)):
-        raise InputError(f"coordinates: covariance has shape {full.shape} (expected {len(order)} by {len(order)})")
-    covariance = full[np.ix_(at, at)]
-    coordinates = np.array([[document["points"][name].get(axis) for axis in "xyz"] for name in names], dtype=float)
-    for name, row in zip(names, np.isfinite(coordinates).all(axis=1), strict=True):
-        if not row:
-            raise InputError(f"coordinates: {name} has no x, y and z (expected three numbers)")
-    return MeasuredPosture(names, coordinates, covariance, posture, subreflector)
 
 
 def frame_motion(antenna: Antenna, measured: MeasuredPosture, frame: str, *, added: Added | None = None) -> FrameMotion:

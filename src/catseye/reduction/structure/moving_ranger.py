@@ -21,7 +21,7 @@ from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.structural_model import StructuralModel
 from catseye.records.site.target import FeedArmRanger
 from catseye.reduction.site.stations import feed_arm_station
-from catseye.reduction.structure.antenna import Antenna, SubreflectorPosition
+from catseye.reduction.structure.antenna import Antenna
 from catseye.reduction.structure.corrections import group_of
 from catseye.signal.vibration.filter import FilterState
 
@@ -73,18 +73,6 @@ class FrameCorrections:
     six: Mapping[str, np.ndarray]
     covariance: np.ndarray
     replaces: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """Points of the telescope in the ground frame.
-
-    position      (..., 3) m
-    covariance    (..., 3, 3) m^2 of each point
-    """
-
-    position: np.ndarray
-    covariance: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,54 +232,6 @@ def moving_ranger(
     return MovingRanger(station, covariance + np.diag(np.repeat([u**2, u_mount**2], 3)))
 
 
-def projected(
-    antenna: Antenna,
-    group: str,
-    drive: Driven,
-    *,
-    times: ArrayLike,
-    known: tuple[FrameCorrections, ...] = (),
-    subreflector: SubreflectorPosition | None = None,
-) -> Placed:
-    """Ground coordinates (..., n, 3) of a group's targets at some times.
-
-    For example t0 and t1 of a buffer.
-
-    antenna        the structural model
-    group          of its points
-    drive          the telescope's motion about these times
-    times          (...), s
-    known          corrections and vibrations; their six are added
-    subreflector   its commanded position
-
-    Raises InputError for an unknown group, ValidityError outside the model's range.
-
-    Source: [PARKER04] section 2.6.1, the projected R_j(t0) and R_j(t1) that the ZIY sends.
-    """
-    posture, added = drive.posture(times), _sum_by_frame(known)
-    position = antenna.points(group, posture, added=added, subreflector=subreflector)
-    wide = TelescopePosture(
-        *(np.asarray(v)[..., None] for v in (posture.azimuth, posture.elevation, posture.temperature_c))
-    )
-    room = {name: np.asarray(value)[..., None, :] for name, value in added.items()}
-    at = antenna.in_frame(group, posture, added=added)
-    frame = antenna.groups[group].frame
-    moved = None
-    if subreflector is not None:
-        shift, angles = np.asarray(subreflector.shift), np.asarray(subreflector.angles)
-        moved = SubreflectorPosition(shift[..., None, :], angles[..., None, :], subreflector.pivot)
-    slopes = antenna.derivatives(frame, at, wide, added=room, subreflector=moved)
-    if group in antenna.motions:
-        slopes[group] = antenna.group_derivatives(group, wide, added=room, subreflector=moved)[group]
-    covariance = _propagated(antenna, wide, slopes, known, room=True)
-    covariance = covariance + antenna.u_points(group)[:, None, None] ** 2 * np.eye(3)
-    if "elevation" in antenna.chain(frame):  # points on the alidade do not follow the elevation
-        covariance = covariance + _of_axes(antenna.axis_derivatives(position, wide), drive)
-    else:
-        covariance = covariance + _of_axes(antenna.axis_derivatives(position, wide)[..., :1], drive)
-    return Placed(position, covariance)
-
-
 def _sum_by_frame(corrections: tuple[FrameCorrections, ...]) -> dict[str, np.ndarray]:
     """Sum of corrections and vibrations, by frame."""
     total: dict[str, np.ndarray] = {}
@@ -306,8 +246,6 @@ def _propagated(
     posture: TelescopePosture,
     slopes: Mapping[str, np.ndarray],
     corrections: tuple[FrameCorrections, ...],
-    *,
-    room: bool = False,
 ) -> np.ndarray:
     """Covariance propagated by the slopes (..., r, 6) of each frame."""
     measured = {name for one in corrections if one.replaces for name in one.six}
@@ -320,8 +258,7 @@ def _propagated(
         parts = [slopes.get(name, np.zeros((*some.shape[-2:],))) for name in one.six]
         batch = np.broadcast_shapes(*(part.shape[:-2] for part in parts))
         slope = np.concatenate([np.broadcast_to(part, (*batch, *part.shape[-2:])) for part in parts], axis=-1)
-        spread = np.asarray(one.covariance)[..., None, :, :] if room else one.covariance
-        total = total + slope @ spread @ np.swapaxes(slope, -1, -2)
+        total = total + slope @ one.covariance @ np.swapaxes(slope, -1, -2)
     return total
 
 

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from catseye.aliases import Array
 from catseye.errors import CatseyeError, InputError
@@ -289,59 +288,3 @@ def less_series(series: Sequence[RangeSeries], less: str) -> tuple[RangeSeries, 
         names = ", ".join(one.name for one in series)
         raise InputError(f"less = {less}: no such series (the journal has {names})")
     return tuple(difference(one, base) for one in series if one.ranger == base.ranger and one.name != less)
-
-
-@dataclass(frozen=True, eq=False)
-class TargetMovement:
-    """Movement of a target by differences of ranges.
-
-    seconds      (n,) s
-    x            (n, 3) m, from the mean, axes of the directions
-    covariance   (n, 3, 3) m^2
-    """
-
-    seconds: Array
-    x: Array
-    covariance: Array
-
-
-def movements(series: Sequence[RangeSeries], directions: ArrayLike, *, longest_gap: float = 0.5) -> TargetMovement:
-    """Movement of a target from three rangers or more.
-
-    And approximate coordinates.
-
-    series        ranges of A rangers, at least three, to one target, at the first one's instants
-    directions    (A, 3) unit vectors from ranger to target
-    longest_gap   s, as for `difference`
-
-    dr_a = e_a . dx, weighted with the u of each range. Raises InputError for fewer than three, or directions in one
-    plane, and as `difference`.
-
-    Source: [PARKER04] section 3.2.4.
-    """
-    e = np.asarray(directions, dtype=float)
-    if len(series) < 3 or e.shape != (len(series), 3):
-        raise InputError(f"{len(series)} series with directions {e.shape} (expected at least three, and as many by 3)")
-    if np.linalg.svd(e, compute_uv=False)[2] < 1e-3:
-        raise InputError(
-            "the directions lie in one plane: a movement across it is unobserved (expected another ranger)"
-        )
-    first = series[0]
-    zero = RangeSeries("", "", first.seconds, np.zeros_like(first.ranges), np.zeros_like(first.u))
-    # the others at the first one's instants: 0 minus the second, sign reversed
-    moved = [difference(zero, second, longest_gap=longest_gap) for second in series[1:]]
-    when = first.seconds
-    for one in moved:
-        when = np.intersect1d(when, one.seconds)
-    if len(when) < LEAST:
-        raise InputError(f"{len(when)} instants are common to all series (expected {LEAST} at least)")
-    rows, u = [first.ranges[np.isin(first.seconds, when)]], [first.u[np.isin(first.seconds, when)]]
-    for one in moved:
-        at = np.isin(one.seconds, when)
-        rows.append(-one.ranges[at])
-        u.append(one.u[at])
-    y, sigma = np.array(rows).T, np.array(u).T
-    weighted = e[None] / sigma[..., None] ** 2
-    covariance = np.linalg.inv(np.einsum("nai,aj->nij", weighted, e))
-    x = np.einsum("nij,naj,na->ni", covariance, weighted, y - y.mean(axis=0))
-    return TargetMovement(when, x, covariance)

@@ -1,0 +1,1 @@
+"""Structural model used: tables, text, figures and files of the commands of `catseye model`."""

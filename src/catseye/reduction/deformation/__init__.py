@@ -1,0 +1,1 @@
+"""Recipe for movements of points from changes of their ranges."""

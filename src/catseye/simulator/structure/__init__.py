@@ -1,0 +1,1 @@
+"""Truth of a telescope that a structural model bends."""
