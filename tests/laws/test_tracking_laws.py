@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
 from catseye.geometry.mirror.pointing import MirrorStation, counts
 from catseye.geometry.mirror.search_pattern import raster, spiral_offsets
-from catseye.geometry.mirror.track import count_line, line_bound, longest_interval, miss
+from catseye.geometry.mirror.track import CountLine, line_bound, longest_interval, miss
 
 FLAT = MirrorStation([0, 0, 0], [0, 0, 0], [0, 0, 0], [0, 0], [0.0, 0.0])
 ROUNDING = 2e-10  # counts, of 50 000
@@ -46,7 +46,7 @@ def test_the_chosen_interval_never_exceeds_the_limit(seed, speed, acceleration, 
     points = motion(rng, p, speed, acceleration, h) @ FLAT.mirror_from_ground
     n = counts(FLAT, points)
     n[:, 0] = np.unwrap(n[:, 0], period=1e5)
-    line = count_line(n[0], n[-1], h).at(np.linspace(0.0, h, 33))
+    line = CountLine(n[0], n[-1], np.array(h)).at(np.linspace(0.0, h, 33))
     off = np.abs(line - n)
     if kind == "counts":
         assert off.max() <= limit + ROUNDING

@@ -1,35 +1,31 @@
-"""`point` and `track`: a mirror's encoder counts for points."""
+"""`point`: a mirror's encoder counts for points."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from catseye.api.reading import place_of
 from catseye.api.result import Result, digest_of, quantities
+from catseye.api.telescope.inputs import InputFiles, mjd_of_argument, posture_of, refuse_alone, telescope_of
 from catseye.api.units import In, with_units
-from catseye.errors import ArgumentError, InputError, ValidityError
+from catseye.errors import ArgumentError
 
 if TYPE_CHECKING:
     from astropy.table import QTable
-    from matplotlib.figure import Figure
 
     from catseye.gateways.writers.passage import Passage
-    from catseye.records.files.record import Record
+    from catseye.records.site.folder import SiteFolder
     from catseye.records.site.keep_out import KeepOut
     from catseye.records.site.mirror import MirrorGeometry
     from catseye.records.site.monument import MonumentGeometry
     from catseye.records.site.solids import Solids
     from catseye.reduction.site.stations import Pointings
     from catseye.reduction.steering.aiming import AimedPoints
-    from catseye.reduction.steering.ground_track import GroundTrack
     from catseye.reduction.steering.sighting import Sighting
     from catseye.reduction.steering.visibility import Visibility
-
-R = TypeVar("R", bound="Record")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,8 +40,11 @@ class PointingResult(Result):
     autocollimation, back_retro   (n,) counts of elevation
     allowed, prime_allowed        (n,) bool: within the mirror's stops
     aimed          everything else
-    names          monument, mirror, and the mirror that the monument's record names
+    names          monument, mirror, and the mirror that the monument's record names; of a site also its ranger
     read           files that were read
+    frame          of the points
+    in_frame       (n, 3) m, in that frame
+    posture        azimuth, elevation, rad, of the telescope; None where nothing depends on it
     """
 
     to: np.ndarray
@@ -60,6 +59,9 @@ class PointingResult(Result):
     aimed: "AimedPoints"
     names: dict[str, str | None] = field(default_factory=dict)
     read: tuple[Path, ...] = ()
+    frame: str = "ground"
+    in_frame: np.ndarray | None = None
+    posture: tuple[float, float] | None = None
 
     @property
     def pointings(self) -> "Pointings":
@@ -82,8 +84,16 @@ class PointingResult(Result):
         from catseye.gateways.writers.passage import Passage
 
         reached = int(np.sum(self.allowed | self.prime_allowed))
-        text = f"{self.names.get('mirror')} on {self.names.get('monument')} reaches {reached} of {len(self.to)} points."
+        text = f"{self._mounted} reaches {reached} of {len(self.to)} points."
         remarks = pointing_remarks(self.aimed)
+        if self.posture is not None:
+            azimuth, elevation = (float(np.degrees(v)) for v in self.posture)
+            where = f"azimuth {azimuth:.10g}, elevation {elevation:.10g} deg"
+            remarks = [
+                f"points of the frame {self.frame.replace('_', ' ')}, telescope at {where}, rigid; x, y, z and "
+                "counts are of the ground frame and this posture",
+                *remarks,
+            ]
         recorded, used = self.names.get("mirror_of_monument"), self.names.get("mirror")
         if recorded is not None and recorded != used:
             of = self.names.get("monument")
@@ -94,7 +104,17 @@ class PointingResult(Result):
         """JSON object of `catseye point --json`: a list, one object a point."""
         from catseye.gateways.steering.pointing_objects import pointing_objects
 
-        return [{**item, **self.names} for item in pointing_objects(self.aimed)]
+        items = [{**item, **self.names} for item in pointing_objects(self.aimed)]
+        if self.posture is None or self.in_frame is None:
+            return items
+        posture = dict(zip(("azimuth", "elevation"), self.posture, strict=True))
+        more = {"frame": self.frame, "posture": posture}
+        return [{**item, **more, "in_frame": at.tolist()} for item, at in zip(items, self.in_frame, strict=True)]
+
+    @property
+    def _mounted(self) -> str:
+        """Mirror and what it stands on."""
+        return f"{self.names['mirror']} on {self.names['monument'] or self.names['ranger']}"
 
     def lines(self) -> list[str]:
         """Lines of the table of counts that the command prints."""
@@ -111,7 +131,7 @@ class PointingResult(Result):
         """
         from catseye.gateways.steering.pointing_objects import write_output_dat
 
-        write_output_dat(self.pointings, f"{self.names['mirror']} on {self.names['monument']}", Path(path))
+        write_output_dat(self.pointings, self._mounted, Path(path))
 
     def tables(self) -> "dict[str, QTable]":
         """`counts`: a row a point."""
@@ -131,7 +151,7 @@ class PointingResult(Result):
 
     def inputs(self) -> dict[str, str]:
         """SHA-256 of each record read."""
-        return {path.name: digest_of(path) for path in self.read}
+        return {path.name: digest_of(path) for path in self.read if path.is_file()}
 
     def sources(self) -> tuple[Path, ...]:
         """Records that `save` leaves alone: those read."""
@@ -140,10 +160,13 @@ class PointingResult(Result):
 
 @with_units
 def point(
-    monument: "str | os.PathLike[str] | MonumentGeometry",
-    mirror: "str | os.PathLike[str] | MirrorGeometry",
-    to: Annotated[Any, In("m", text=True)],
+    monument: "str | os.PathLike[str] | MonumentGeometry | None" = None,
+    mirror: "str | os.PathLike[str] | MirrorGeometry | None" = None,
+    to: Annotated[Any, In("m", text=True)] = None,
     *,
+    site: "str | os.PathLike[str] | SiteFolder | None" = None,
+    ranger: str | None = None,
+    frame: str = "ground",
     at_mjd: Annotated[Any, In("mjd", one=True, text=True)] = None,
     latitude_deg: Annotated[Any, In("deg", one=True)] = None,
     longitude_deg: Annotated[Any, In("deg", one=True)] = None,
@@ -159,7 +182,10 @@ def point(
     Both pointings, with stops, Sun, keep-out boxes and visibility.
 
     monument, mirror   records, or their files
-    to                 (n, 3) or (3,) m, ground; or a coord.dat of lines x y z in mm
+    to                 (n, 3) or (3,) m, in the frame; or a coord.dat of lines x y z in mm
+    site, ranger       instead of the records: a site, and the name of its ranger, on the ground or the feed arm
+    frame              of the points: "ground", "alidade", "elevation", "reflector", "feed_arm", "prime_focus" or
+                       "subreflector", of a rigid telescope at the posture
     at_mjd             UTC, MJD or a text such as 2003-09-07T15:12:09Z: is the Sun in the way?
     latitude_deg, longitude_deg   of the site, east positive; the monument's record without; with at_mjd
     sun_cone_deg       half angle kept from the Sun, 0.5 to 60; of keep_out, or 5, without; with at_mjd
@@ -167,29 +193,49 @@ def point(
     reflector          "prism", "hollow" or "ball" at the points: is it visible?
     facing             (3,) outward axis of the reflectors, ground axes
     solids             obstacles, or their file
-    posture_deg        azimuth and elevation of the telescope, for solids that it carries; with solids
+    posture_deg        azimuth and elevation of the telescope, for points, rangers and solids that it carries; the
+                       site's own without
 
     Raises ArgumentError for arguments that do not fit together, InputError for records that cannot be used.
-    Source: [PARKER04] section 2.
+    Source: [PARKER04] section 2; eqs. 2.40 to 2.44 for frames, section 2.6.1 for the feed arm.
 
     >>> counts = point("night-01/monuments/ZY103.toml", "night-01/mirrors/ZP103.toml", [0.0, 0.0, 50.0]).counts
     >>> counts.shape
     (1, 2)
+    >>> on_arm = point(site="gbt", ranger="ZY115", frame="reflector", to=[0, 54, 12.2], posture_deg=(145.3, 30))
+    >>> on_arm.range_.round(2).tolist()
+    [74.89]
     """
+    from catseye.geometry.antenna.rigid_telescope import FRAMES
     from catseye.records.site.keep_out import KeepOut
-    from catseye.records.site.mirror import MirrorGeometry
-    from catseye.records.site.monument import MonumentGeometry
     from catseye.records.site.solids import Solids
-    from catseye.reduction.steering.aiming import BeamSurroundings, aim_mirror
+    from catseye.reduction.steering.aiming import BeamSurroundings, aim_ranger
+    from catseye.reduction.steering.mounted import posture_of_site
 
-    mjd, cone, posture = _mjd(at_mjd), _sun_cone(sun_cone_deg), _posture(posture_deg)
+    mjd, cone, posture = mjd_of_argument(at_mjd), _sun_cone(sun_cone_deg), posture_of(posture_deg)
     axis = _facing(facing)
     by_sun = {"sun_cone_deg": sun_cone_deg, "latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
-    _refuse_alone(by_sun, "at_mjd", at_mjd)
-    _refuse_alone({"posture_deg": posture_deg}, "solids", solids)
-    records = _Records()
-    stands, mirrors = records.read(monument, MonumentGeometry), records.read(mirror, MirrorGeometry)
-    where = records.points(to)
+    refuse_alone(by_sun, "at_mjd", at_mjd)
+    if frame not in FRAMES:
+        raise ArgumentError(f"frame = {frame!r} is unknown (expected one of {', '.join(FRAMES)})", "frame")
+    if to is None:
+        raise ArgumentError("to is missing (expected points, or their file)", "to")
+    records = InputFiles()
+    stands = None if site is None else records.site(site)
+    mounted = records.ranger(monument, mirror, stands, ranger)
+    moving = frame != "ground" or mounted.moves
+    if not moving and posture_deg is not None and solids is None:
+        text = "posture_deg says nothing without solids, a frame that moves, or a ranger on the feed arm"
+        raise ArgumentError(text, "posture_deg", "solids")
+    if posture is None and stands is not None:
+        posture = posture_of_site(stands)
+    if posture is None and moving:
+        raise ArgumentError(
+            f"posture_deg is missing: it moves the frame {frame} (expected azimuth and elevation)", "posture_deg"
+        )
+    telescope = telescope_of(stands, posture) if moving and posture is not None else None
+    points = records.points(to)
+    where = points if telescope is None else telescope.ground_from(frame).points(points)
     zones = KeepOut() if keep_out is None else records.read(keep_out, KeepOut)
     if cone is not None:
         zones = zones.model_copy(update={"sun": zones.sun.model_copy(update={"half_angle_deg": cone})})
@@ -203,7 +249,7 @@ def point(
         solids=None if solids is None else records.read(solids, Solids),
         posture=posture,
     )
-    aimed = aim_mirror(stands, mirrors, where, surroundings)
+    aimed = aim_ranger(mounted, where, surroundings, telescope)
     pointings = aimed.pointings
     return PointingResult(
         verdict=aimed.verdict,
@@ -217,56 +263,12 @@ def point(
         allowed=pointings.allowed,
         prime_allowed=pointings.prime_allowed,
         aimed=aimed,
-        names={"monument": stands.monument, "mirror": mirrors.zp, "mirror_of_monument": stands.zp},
+        names=mounted.names,
         read=tuple(records.paths),
+        frame=frame,
+        in_frame=points,
+        posture=posture if moving else None,
     )
-
-
-@dataclass
-class _Records:
-    """Records read from files; `paths` collects these."""
-
-    paths: list[Path] = field(default_factory=list)
-
-    def read(self, source: Any, kind: type[R]) -> R:
-        """Record of a kind, or the one in a file."""
-        from catseye.records.files.reading import read_record
-
-        if isinstance(source, kind):
-            return source
-        self.paths.append(place_of(source))
-        return read_record(self.paths[-1], kind)
-
-    def points(self, to: Any) -> np.ndarray:
-        """Points (n, 3) m, of numbers or of a coord.dat."""
-        if isinstance(to, str | os.PathLike):
-            from catseye.records.laboratory.coordinate_list import read_coordinates
-
-            self.paths.append(place_of(to))
-            return read_coordinates(self.paths[-1])
-        where = np.atleast_2d(np.asarray(to, dtype=float))
-        if where.ndim != 2 or where.shape[1] != 3 or not np.isfinite(where).all():
-            raise InputError(f"points of shape {where.shape} (expected (n, 3) or (3,), finite, m)")
-        return where
-
-
-def _refuse_alone(values: Mapping[str, Any], needed: str, value: Any) -> None:
-    """Raises ArgumentError for what says nothing without another argument."""
-    for name, each in values.items():
-        if each is not None and value is None:
-            raise ArgumentError(f"{name} says nothing without {needed}", name, needed)
-
-
-def _mjd(at_mjd: Any) -> float | None:
-    """MJD of a number or a text. Raises ArgumentError for another text."""
-    from catseye.geometry.sky.time_tag import mjd_of
-
-    if not isinstance(at_mjd, str):
-        return None if at_mjd is None else float(at_mjd)
-    try:
-        return mjd_of(at_mjd)
-    except ValidityError as problem:
-        raise ArgumentError(f"at_mjd = {problem}", "at_mjd") from problem
 
 
 def _sun_cone(sun_cone_deg: float | None) -> float | None:
@@ -282,145 +284,3 @@ def _facing(facing: Sequence[float] | None) -> np.ndarray | None:
     if axis is not None and (axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any()):
         raise ArgumentError(f"facing = {axis.tolist()} points nowhere (expected three numbers, not all zero)", "facing")
     return axis
-
-
-def _posture(posture_deg: Sequence[float] | None) -> tuple[float, float] | None:
-    """Posture (2,), rad. Raises ArgumentError beyond the telescope's."""
-    if posture_deg is None:
-        return None
-    if len(posture_deg) != 2 or not _within(*posture_deg):
-        said = ", ".join(f"{v:g}" for v in posture_deg)
-        raise ArgumentError(f"posture_deg = {said} (expected azimuth -540 to 540, elevation -5 to 95)", "posture_deg")
-    return float(np.radians(posture_deg[0])), float(np.radians(posture_deg[1]))
-
-
-def _within(azimuth_deg: float, elevation_deg: float) -> bool:
-    return abs(azimuth_deg) <= 540.0 and -5.0 <= elevation_deg <= 95.0
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class TrackResult(Result):
-    """Counts of one mirror that follows n points.
-
-    Over intervals between k + 1 times.
-
-    seconds    (k + 1,) s, ends of the intervals
-    counts     (k + 1, n, 2) azimuth and elevation at each, on one turn and in one pointing
-    misses     (s, k, n) m, how far the beam passes its target at s instants of each interval
-    worst      (n,) m, the largest of each
-    status     (n,) text: "followed", or the reason against it
-    track      everything else
-    """
-
-    seconds: np.ndarray
-    counts: np.ndarray
-    misses: np.ndarray
-    worst: np.ndarray
-    status: tuple[str, ...]
-    track: "GroundTrack"
-
-    def passages(self) -> "Sequence[Passage]":
-        """Number of points followed, and the beams' largest distances from them."""
-        from catseye.gateways.writers.passage import Passage
-
-        good = np.isfinite(self.worst)
-        text = f"{int(good.sum())} of {len(self.worst)} points followed over {np.ptp(self.seconds):g} s in "
-        text += f"{len(self.seconds) - 1} intervals"
-        if good.any():
-            text += f"; beams pass them by {1e3 * float(np.max(self.worst[good])):.3g} mm at most, counts not rounded"
-        bad = [f"point {k}: {why}" for k, why in enumerate(self.status) if not good[k]]
-        return [Passage("The track", text + "."), *(Passage("Not followed", line) for line in bad[:5])]
-
-    def to_object(self) -> dict[str, Any]:
-        """Arrays in SI and counts."""
-        names = ("seconds", "counts", "worst", "status")
-        return {"verdict": self.verdict.to_object(), **{name: getattr(self, name) for name in names}}
-
-    def tables(self) -> "dict[str, QTable]":
-        """`counts`: a row a time, columns of all points."""
-        columns = {
-            "time": (self.seconds, "s"),
-            "azimuth_counts": (self.counts[:, :, 0], ""),
-            "elevation_counts": (self.counts[:, :, 1], ""),
-        }
-        return {"counts": quantities(columns)}
-
-    def figures(self) -> "dict[str, Figure]":
-        """Distances of the beams from their targets, over the track."""
-        from catseye.gateways.steering.tracking_figures import miss_figure
-        from catseye.reduction.steering.tracking import SHARES
-
-        return {"misses": miss_figure(self.track.track, self.misses[:, :, None, :], SHARES)}
-
-
-@with_units
-def track(
-    monument: "str | os.PathLike[str] | MonumentGeometry",
-    mirror: "str | os.PathLike[str] | MirrorGeometry",
-    points: Annotated[Any, In("m")],
-    *,
-    start_deg: Annotated[Any, In("deg", many=True)],
-    end_deg: Annotated[Any, In("deg", many=True)],
-    frame: str = "reflector",
-    start_mjd: Annotated[Any, In("mjd", one=True)] = 60_635.125,
-    interval_s: Annotated[Any, In("s", one=True)] = 0.128,
-    azimuth_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
-    elevation_rate_deg_per_s: Annotated[Any, In("deg / s", one=True)] = None,
-) -> TrackResult:
-    """Mirror counts for points that move with the telescope.
-
-    At t0 and t1 of each interval, as it slews or tracks.
-
-    monument, mirror    records, or their files; of a ranger on the ground
-    points              (n, 3) or (3,) m, fixed in the frame
-    start_deg, end_deg  azimuth and elevation that the telescope goes from and to, both axes at once
-    frame               "ground", "alidade", "elevation" or "reflector"
-    start_mjd           UTC at the first t0
-    interval_s          length of an interval: a buffer's
-    azimuth_rate_deg_per_s, elevation_rate_deg_per_s   of the drives; the Green Bank Telescope's fastest without
-
-    A point that the mirror cannot follow has a status that names the reason, and no counts that mean anything.
-    Raises InputError for records and postures that cannot be used. Source: [PARKER04] section 2.6.
-
-    >>> went = track("night-01/monuments/ZY103.toml", "night-01/mirrors/ZP103.toml", [0.0, 54.0, 12.0],
-    ...              start_deg=(145.0, 30.0), end_deg=(145.3, 30.1))
-    >>> went.status, bool(went.worst[0] < 1e-3)
-    (('followed',), True)
-    """
-    from catseye.constants import DEGREE
-    from catseye.geometry.sky.time_tag import TimeTag
-    from catseye.records.site.mirror import MirrorGeometry
-    from catseye.records.site.monument import MonumentGeometry
-    from catseye.reduction.steering.ground_track import follow_points
-    from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, AntennaPath, Drive
-
-    records = _Records()
-    stands, mirrors = records.read(monument, MonumentGeometry), records.read(mirror, MirrorGeometry)
-    where = np.atleast_2d(np.asarray(points, dtype=float))
-    if where.ndim != 2 or where.shape[1] != 3 or not np.isfinite(where).all():
-        raise InputError(f"points of shape {where.shape} (expected (n, 3) or (3,), finite, m)")
-    for az, el in (start_deg, end_deg):
-        if not _within(az, el):
-            raise InputError(f"posture {az:g}, {el:g} deg (expected azimuth -540 to 540, elevation -5 to 95)")
-    fastest = ((azimuth_rate_deg_per_s, AZIMUTH_SLEW), (elevation_rate_deg_per_s, ELEVATION_SLEW))
-    rates = [most if rate is None else rate * DEGREE for rate, most in fastest]
-    ends = zip(start_deg, end_deg, rates, strict=True)
-    azimuth, elevation = (Drive(a * DEGREE, b * DEGREE, rate=rate) for a, b, rate in ends)
-    followed = follow_points(
-        stands,
-        mirrors,
-        where,
-        frame=frame,
-        path=AntennaPath(azimuth, elevation),
-        start=TimeTag.from_mjd(start_mjd),
-        interval=interval_s,
-    )
-    return TrackResult(
-        verdict=followed.verdict,
-        seconds=followed.track.since,
-        counts=followed.counts,
-        misses=followed.misses,
-        worst=followed.worst,
-        status=followed.status,
-        track=followed,
-    )

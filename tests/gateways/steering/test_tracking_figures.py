@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from catseye.gateways.steering import tracking_figures
-from catseye.gateways.steering.tracking_figures import miss_figure, search_figure, visibility_figure
+from catseye.gateways.steering.tracking_figures import error_figure, miss_figure, search_figure, visibility_figure
 from catseye.gateways.writers.drawing import svg
 from catseye.geometry.mirror.pointing import MirrorStation
 from catseye.geometry.sky.time_tag import TimeTag
@@ -17,6 +17,7 @@ from catseye.reduction.steering.tracking import (
     AntennaPath,
     Drive,
     Following,
+    count_errors,
     fixed,
     follow,
     misses,
@@ -101,3 +102,17 @@ def test_the_matrix_has_a_cell_for_each_pair(kept, night_01):
     said = {t.get_text() for t in kept[0].legends[0].get_texts()}
     assert f"seen: {int(found.seen.sum())}" in said
     assert set(tracking_figures.SIGHTS) == set(Sight)
+
+
+def test_errors_of_counts_are_zero_at_the_nodes_and_drawn_between(kept):
+    path = AntennaPath(Drive(0.0, 1.0, rate=AZIMUTH_SLEW), Drive(0.5, 0.5, rate=0.01))
+    targets = fixed([[0.0, 30.0, 60.0], [20.0, 10.0, 50.0]], "reflector", path)
+    track = follow(mounted(STATION), targets, TimeTag(52889, 0), intervals=20)
+    shares = np.array([0.25, 0.5, 0.75])
+    errors = count_errors(track, mounted(STATION), targets, shares=shares)
+    drawn(error_figure(track, errors, shares))
+    line = kept[0].axes[0].lines[0].get_ydata()
+    np.testing.assert_array_equal(line[::5], 0.0)
+    np.testing.assert_array_equal(line[2::5], errors[:, 1, 0, 0, 0])
+    ends = count_errors(track, mounted(STATION), targets, shares=[0.0, 1.0])
+    assert np.abs(ends).max() < 1e-6 < np.abs(errors).max()

@@ -12,7 +12,6 @@ from catseye.geometry.antenna.beam_deviation import (
     Gregorian,
     aperture,
     prime_focus_tilt,
-    receiver_tilt,
     subreflector_tilt,
 )
 
@@ -128,6 +127,12 @@ def test_the_chosen_gregorian_pair_is_that_of_an_offset_telescope():
     assert np.ptp(half) < 0.02
     assert half.mean() == pytest.approx(14.99, abs=0.02)
     assert 1.0 / receiver_tilt(GBT, SUB)[0, 0] == pytest.approx(190.0, rel=0.03)  # symmetric dish of 190 m, deviation 1
+
+
+def receiver_tilt(of, gregorian):
+    """Slopes (2, 3), rad/m, for a shift of a receiver at the second focus: d . (F - Q) / |F - Q| by Fermat."""
+    path = gregorian.second_focus(of.focus) - gregorian.reflections(of)
+    return of.tilt(path / np.linalg.norm(path, axis=1)[:, None])
 
 
 def test_moving_subreflector_and_receiver_together_is_moving_both_foci():

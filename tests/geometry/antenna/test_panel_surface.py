@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from catseye.geometry.antenna.panel_surface import axes, cosine_of_slope, panels_under, shares, warps
-from catseye.geometry.antenna.panel_tool import observed_freedoms, turned
+from catseye.geometry.antenna.panel_tool import turned
 from catseye.simulator.laboratory.panels import panel_at
 from panel_scene import dish
 
@@ -99,9 +99,3 @@ def test_quarter_turns_carry_gauges_round_and_come_back():
     assert np.array_equal(there[4], there[0])
     assert np.array_equal(there[2], -there[0])
     assert all(np.cross([*a, 0], [*b, 0])[2] > 0.0 for a, b in pairwise(there))
-
-
-def test_observable_heights_depend_on_measured_shaft_freedoms():
-    square = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * 0.075
-    assert observed_freedoms(square, tilt_known=False, height_known=True) == 2
-    assert observed_freedoms(square[:3], tilt_known=False, height_known=False) == 0

@@ -27,20 +27,6 @@ def test_the_six_equations_as_printed():
     assert encoder.prime_counts(na, ne, ne0) == (pytest.approx(na + 50_000), pytest.approx(2 * ne0 - ne))
 
 
-@given(st.floats(-30.0, 30.0))
-def test_a_wrapped_angle_is_the_same_direction_within_its_range(theta):
-    wrapped = float(encoder.wrapped(theta))
-    assert -np.pi / 2 <= wrapped < 3 * np.pi / 2
-    assert abs(np.exp(1j * wrapped) - np.exp(1j * theta)) < 1e-13
-
-
-@pytest.mark.parametrize(
-    "theta", [-np.pi / 2, np.nextafter(-np.pi / 2, -4), 3 * np.pi / 2, np.nextafter(4.712, 5), 0.0]
-)
-def test_the_ends_of_the_range_wrap_to_its_inside(theta):
-    assert -np.pi / 2 <= float(encoder.wrapped(theta)) < 3 * np.pi / 2
-
-
 @given(azimuths, azimuths, st.integers(8, 1_600_000).map(lambda n: n / 8))
 def test_whole_turns_bring_a_count_between_the_stops_whenever_any_can(na, low, span):
     moved, high = float(encoder.turned_within(na, low, low + span)), low + span

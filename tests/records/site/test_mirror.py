@@ -50,6 +50,13 @@ def test_an_uncertainty_may_stand_alone(tmp_path, u):
         ("amplitude_to_phase_rad = 1e-3", "amplitude_to_phase_rad = 0.001 has no u_amplitude_to_phase_rad"),
         ("cyclic_cosine_mm = [0, 0.1]\ncyclic_sine_mm = [0, 0]", "cyclic_cosine_mm = [0.0, 0.1] has no u_cyclic_mm"),
         ("cyclic_cosine_mm = [0]\ncyclic_sine_mm = [1e-3]", "cyclic_sine_mm = [0.001] has no u_cyclic_mm"),
+        ("detector_lag_rad = 0.02", "detector_lag_rad = 0.02 has no u_image_um (expected its standard uncertainty)"),
+        ("u_image_um = 5", "detector_radius_mm is missing beside u_image_um (expected both or none)"),
+        ("detector_radius_mm = 0.1", "u_image_um is missing beside detector_radius_mm (expected both or none)"),
+        (
+            "detector_radius_mm = 0.1\nu_image_um = 5\nimage_offset_um = 90",
+            "image_offset_um + 3 u_image_um = 105 um is beyond the disc (expected up to 100, by detector_radius_mm)",
+        ),
         (
             "cyclic_cosine_mm = [0.1]\nu_cyclic_mm = 0.01",
             "cyclic_cosine_mm has 1 orders, cyclic_sine_mm 0 (expected as many of each)",

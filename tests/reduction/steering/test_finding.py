@@ -8,13 +8,14 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.pointing import MirrorStation, counts, ray
+from catseye.geometry.mirror.pointing import MirrorStation, counts
 from catseye.geometry.mirror.search_pattern import count_size, offsets_of_counts
 from catseye.geometry.sky.time_tag import TimeTag
-from catseye.optics.spot import gaussian_spot, matched_radius, offset_share
-from catseye.reduction.steering.finding import SearchResult, adjustment_readings, find, found_point, search_results
+from catseye.optics.spot import gaussian_spot, offset_share
+from catseye.reduction.steering.finding import SearchResult, adjustment_readings, find
 from catseye.reduction.steering.spot_fit import SearchHead, Spot, fit_spot
 from draws import draws
+from optics.spot_scene import matched_radius
 
 STATION = MirrorStation([112.99, 44.28, 0.0], [-1.1973, 1.6e-5, -4e-6], [0.0, 0.2475, 0.0], [-5e-4, 9e-5], [2691, 1434])
 TARGET = np.array([20.0, -30.0, 75.0])
@@ -165,11 +166,11 @@ def test_the_claims_hold_over_many_spots(how):
 
 
 def test_the_derivatives_of_the_fit_are_finite_differences():
-    from catseye.reduction.steering.spot_fit import _SpotModel
+    from catseye.reduction.steering.spot_fit import SpotModel
 
     rng = np.random.default_rng(3)
     xy = rng.uniform(-2, 2, (30, 2))
-    sheet = _SpotModel(xy, rng.uniform(0, 5, 30), np.zeros(30, bool), HEAD, np.array([0.1, 0.2]))
+    sheet = SpotModel(xy, rng.uniform(0, 5, 30), np.zeros(30, bool), HEAD, np.array([0.1, 0.2]))
     p = np.array([0.2, -0.3, 0.15, 4.0, 0.3, 0.6])
     for k in range(6):
         step = np.zeros(6)
@@ -213,45 +214,6 @@ def test_too_little_light_or_too_few_readings_or_an_edge_is_a_status():
     assert "outside the scan" in aside.status
     with pytest.raises(ValidityError, match="amplitude has shape"):
         fit_spot(n, np.ones(3), HEAD)
-
-
-def test_a_found_target_has_coordinates_with_their_covariance():
-    spot = Spot("found", np.add(TRUE, [2.0, -1.0]), np.array([[0.04, 0.01], [0.01, 0.09]]), 5.0, RADIUS, 0.0, 1.0, 50)
-    point, covariance = found_point(STATION, spot, RANGE, u_distance=5e-3)
-    origin, direction = ray(STATION, spot.counts)
-    np.testing.assert_allclose(point, origin + RANGE * direction, atol=1e-12)
-    np.testing.assert_allclose(counts(STATION, point), spot.counts, atol=1e-6)
-    rng = np.random.default_rng(1)
-    drawn = rng.multivariate_normal(spot.counts, spot.covariance, 40_000)
-    distance = RANGE + 5e-3 * rng.normal(size=(len(drawn), 1))
-    many = np.cov((STATION.scan_point + distance * ray(STATION, drawn).direction).T)
-    np.testing.assert_allclose(covariance, many, atol=0.03 * np.abs(many).max())
-    wider = found_point(
-        STATION, spot, RANGE, u_distance=5e-3, of_station=np.diag([1e-8] * 3 + [1e-10] * 3 + [0.0] * 7)
-    )[1]
-    assert np.all(np.linalg.eigvalsh(wider - covariance) >= -1e-15)
-    # the fixed point's share is its own covariance
-    only = (
-        found_point(STATION, spot, RANGE, u_distance=5e-3, of_station=np.diag([1e-8] * 3 + [0.0] * 10))[1] - covariance
-    )
-    np.testing.assert_allclose(only, 1e-8 * np.eye(3), atol=1e-15)
-    with pytest.raises(ValidityError, match="no point for a target that was not found"):
-        found_point(STATION, Spot("not found: dark"), RANGE, u_distance=1e-4)
-    with pytest.raises(ValidityError, match=r"distance -1\.0 m"):
-        found_point(STATION, spot, -1.0, u_distance=1e-4)
-    with pytest.raises(ValidityError, match=r"distance inf m"):
-        found_point(STATION, spot, np.inf, u_distance=1e-4)
-
-
-def test_search_results_are_a_table_that_keeps_the_microsecond():
-    when = TimeTag.parse("52889.25000000001")
-    good = Spot("found", np.array([9000.1234, -55.4321]), np.diag([0.04, 0.09]), 5.5, RADIUS, 0.0, 1.0, 50)
-    text = search_results([SearchResult("DP001", good, when), SearchResult("DP002", Spot("not found: dark"), when)])
-    lines = text.splitlines()
-    assert lines[0] == ("target,azimuth_counts,elevation_counts,u_azimuth_counts,u_elevation_counts,amplitude_volt,mjd")
-    assert lines[1:] == ["DP001,9000.123,-55.432,0.2000,0.3000,5.5000,52889.25000000001"]
-    with pytest.raises(ValidityError, match="none of 1 targets was found"):
-        search_results([SearchResult("DP002", Spot("not found: dark"), when)])
 
 
 def test_the_table_for_the_adjustment_has_the_columns_that_its_calibration_reads():
@@ -310,8 +272,6 @@ def test_a_spike_on_the_way_does_not_end_the_search():
 
 def test_a_name_that_would_break_the_table_is_refused():
     result = SearchResult("A,B", Spot("found", np.array([1.0, 2.0]), np.eye(2)), TimeTag(1, 0))
-    with pytest.raises(ValidityError, match="'A,B' is not a valid name for a table"):
-        search_results([result])
     with pytest.raises(ValidityError, match="'A,B' is not a valid name for a table"):
         adjustment_readings([result], {"A,B": [1, 2, 3]}, 0.0)
 

@@ -9,7 +9,8 @@ from catseye.records.files.reading import read_record
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
 from catseye.reduction.site.stations import station_of
-from catseye.reduction.steering.ground_track import follow_points
+from catseye.reduction.steering.ground_track import follow_by
+from catseye.reduction.steering.mounted import ranger_of_records
 from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, AntennaPath, Drive
 from repository import ROOT
 
@@ -21,6 +22,7 @@ STILL = AntennaPath(
 )
 SCAN_POINT = station_of(MONUMENT, MIRROR).scan_point
 FAR = np.array([0.0, 0.0, 50.0])
+RANGER = ranger_of_records(MONUMENT, MIRROR)
 
 
 @pytest.mark.parametrize(
@@ -32,8 +34,8 @@ FAR = np.array([0.0, 0.0, 50.0])
     ],
 )
 def test_the_verdict_counts_the_points_that_are_followed(points, word, why):
-    found = follow_points(
-        MONUMENT, MIRROR, np.array(points), frame="ground", path=STILL, start=TimeTag.parse("52889.125"), interval=0.128
+    found = follow_by(
+        RANGER, np.array(points), frame="ground", path=STILL, start=TimeTag.parse("52889.125"), interval=0.128
     )
     assert found.verdict.word == word
     assert found.verdict.why.startswith(why)

@@ -12,8 +12,8 @@ from catseye.geometry.antenna.frames import (
     ground_from_alidade,
     ground_from_reflector,
 )
-from catseye.geometry.mirror.pointing import MirrorStation, counts, ray
-from catseye.geometry.mirror.track import apparent_motion, count_motion, line_bound, line_estimate
+from catseye.geometry.mirror.pointing import MirrorStation
+from catseye.geometry.mirror.track import apparent_motion, line_bound
 from catseye.geometry.sky.time_tag import TimeTag
 from catseye.reduction.site.stations import station_of
 from catseye.reduction.steering.tracking import (
@@ -28,7 +28,6 @@ from catseye.reduction.steering.tracking import (
     follow,
     misses,
     mounted,
-    safe_intervals,
     smear,
 )
 
@@ -145,7 +144,7 @@ def test_at_slew_rates_the_lines_stay_within_a_millimetre(ground):
     assert np.all((na >= limits[:, 0][:, None]) & (na <= limits[:, 1][:, None]) | ~good)
 
 
-def test_the_miss_agrees_with_estimate_and_bound(ground):
+def test_the_miss_holds_its_bound(ground):
     stations, _ = ground
     t = np.array([40.0, 55.0])
     place, speed, bend = SLEW.motion(DISH, "reflector", t)
@@ -155,10 +154,7 @@ def test_the_miss_agrees_with_estimate_and_bound(ground):
         speed[:, None],
         acceleration=bend[:, None],
     )
-    estimate = line_estimate(count_motion(*seen)[1], BUFFER)
-    bound, _, way = line_bound(seen[0], np.linalg.norm(seen[1], axis=-1), 0.06, interval=BUFFER)
-    assert np.all(estimate <= bound)
-    assert np.median(bound / estimate) < 30.0
+    _, _, way = line_bound(seen[0], np.linalg.norm(seen[1], axis=-1), 0.06, interval=BUFFER)
     path = AntennaPath(SLEW.azimuth, SLEW.elevation)
 
     def targets(since):
@@ -166,11 +162,14 @@ def test_the_miss_agrees_with_estimate_and_bound(ground):
 
     track = follow(mounted(stations), targets, START, intervals=1)
     off = misses(track, mounted(stations), targets, shares=[0.5])[0, 0]
-    r = np.linalg.norm(seen[0][0], axis=-1)
-    sine = np.hypot(seen[0][0][..., 0], seen[0][0][..., 1]) / r
-    by_estimate = r * np.hypot(estimate[0][..., 0] * 6.28319e-5 * sine, estimate[0][..., 1] * 1.256637e-4)
-    np.testing.assert_allclose(off, by_estimate, rtol=0.02, atol=1e-8)
+    assert np.median(way[0] / off) < 30.0  # and it is no idle one
     assert np.all(off <= way[0])
+
+
+def own_counts(vector):
+    """Counts for a vector in mirror axes, zeros 0."""
+    x, y, z = vector
+    return np.array([np.arctan2(y, x) / (2 * np.pi), np.arccos(z / np.linalg.norm(vector)) / (4 * np.pi)]) * 1e5
 
 
 def test_a_feed_arm_ranger_rides_with_the_reflector_and_follows_a_ground_target(ground):
@@ -207,7 +206,8 @@ def test_a_feed_arm_ranger_rides_with_the_reflector_and_follows_a_ground_target(
     spin, change = SLEW.spin(when)
     m = riding(np.array([when]))[0, 0, 0].mirror_from_ground
     seen = apparent_motion(m, place - s, speed - vs, acceleration=bend - as_, spin=spin, spin_rate=change)
-    np.testing.assert_allclose(moving.lines.rate[0, 0, 0], count_motion(*seen)[0][0], rtol=1e-5)
+    ahead, behind = (seen[0][0] + sign * 1e-4 * seen[1][0] for sign in (1.0, -1.0))
+    np.testing.assert_allclose(moving.lines.rate[0, 0, 0], (own_counts(ahead) - own_counts(behind)) / 2e-4, rtol=1e-5)
 
 
 def test_stops_take_the_other_pointing_and_refuse_what_neither_reaches(ground):
@@ -253,39 +253,3 @@ def test_a_range_change_of_half_a_wavelength_cancels_a_buffer():
     np.testing.assert_allclose(left, taken, atol=1e-6)
     with pytest.raises(ValidityError, match=r"wavelength -0\.2 m"):
         smear(v, wavelength=-0.2)
-
-
-@pytest.mark.parametrize("frame", ["alidade", "elevation", "reflector"])
-def test_no_acceleration_exceeds_the_upper_limit(frame):
-    points = np.concatenate([DISH, [[30.0, -20.0, 40.0], [0.0, 0.0, 0.0]]])
-    _, _, a = SLEW.motion(points, frame, np.linspace(-1.0, SLEW.azimuth.duration + 1.0, 3000))
-    size = np.linalg.norm(a, axis=-1)
-    most = SLEW.most_acceleration(points, frame)
-    assert np.all(size <= most * (1 + 1e-12))
-    far = most > 0.01
-    assert np.all(size.max(axis=0)[far] > 0.3 * most[far])  # and it is no idle bound
-
-
-@pytest.mark.parametrize("limit", [{"limit_counts": 0.25}, {"limit_angle": 1e-5}])
-def test_over_a_safe_interval_the_line_holds_its_limit(ground, limit):
-    stations, _limits = ground
-    times = np.array([5.0, 40.0, 80.0])
-    safe = safe_intervals(stations, DISH, "reflector", path=SLEW, times=times, **limit)
-    assert safe.shape == (3, 12, 9)
-    assert np.all(safe > 0.0)
-    targets = fixed(DISH, "reflector", SLEW)
-    for i, begin in enumerate(times):
-        for r, p in ((0, 0), (3, 4), (7, 8), (11, 2)):
-            h = np.floor(safe[i, r, p] * 1e9) / 1e9
-            at, one = np.linspace(0.0, 1.0, 33), stations[r]
-            n = np.unwrap(counts(one, targets(begin + at * h)[:, 0, p]), period=1e5, axis=0)
-            line = n[0] + at[:, None] * (n[-1] - n[0])
-            off = np.abs(n - line)
-            if "limit_counts" in limit:
-                assert off.max() <= 0.25
-            else:
-                sight = ray(one, line).direction
-                true = ray(one, n).direction
-                assert np.max(np.linalg.norm(sight - true, axis=-1)) <= 1e-5
-    with pytest.raises(InputError, match="frame 'sky' is unknown"):
-        SLEW.most_acceleration(DISH, "sky")

@@ -137,6 +137,7 @@ def prediction_object(prediction: PointingPrediction) -> dict[str, Any]:
         "order": list(AXES),
         "correction": prediction.correction,
         "covariance": prediction.covariance,
+        "structure": prediction.structure,
         "encoders": {
             "azimuth_deg": prediction.encoders[0] / DEGREE,
             "elevation_deg": prediction.encoders[1] / DEGREE,

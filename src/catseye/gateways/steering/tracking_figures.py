@@ -16,17 +16,26 @@ SIGHTS = {
     Sight.TOO_NEAR: (SERIES[5], "too near"),
     Sight.BEYOND_STOPS: (BAD, "beyond the stops"),
 }
+MOST_PAIRS = 6  # lines of a figure
 MOST_LABELS = 60  # on one axis
 ELLIPSE = 3.0  # standard deviations drawn
 
 
-def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, limit: float = 1e-3) -> Figure:
+def miss_figure(
+    track: CountTrack,
+    misses: np.ndarray,
+    shares: np.ndarray,
+    *,
+    limit: float = 1e-3,
+    ideal_misses: np.ndarray | None = None,
+) -> Figure:
     """Distance by which beams miss their targets over the track: worst pair, median, limit.
 
-    track     followed track
-    misses    (s, k, r, p) m, of `reduction.steering.tracking.misses`
-    shares    (k,) position within each interval
-    limit     m, drawn as a line
+    track          followed track
+    misses         (s, k, r, p) m, of `reduction.steering.tracking.misses`
+    shares         (k,) position within each interval
+    limit          m, drawn as a line
+    ideal_misses   (s, k, r, p) m, at the counts of mirrors without imperfections; drawn if present
     """
     good = track.status == Following.FOLLOWED
     when = (track.since[:-1, None] + np.asarray(shares) * np.diff(track.since)[:, None]).ravel()
@@ -37,11 +46,63 @@ def miss_figure(track: CountTrack, misses: np.ndarray, shares: np.ndarray, *, li
             distances_mm = 1e3 * misses[:, :, good].reshape(len(when), -1)
             ax.plot(when, distances_mm.max(axis=1), color=SERIES[1], lw=1.1, label=f"worst of {int(good.sum())} pairs")
             ax.plot(when, np.median(distances_mm, axis=1), color=SERIES[0], lw=1.1, label="median")
+            if ideal_misses is not None:
+                worst_mm = 1e3 * ideal_misses[:, :, good].reshape(len(when), -1).max(axis=1)
+                ax.plot(when, worst_mm, color=SERIES[3], lw=1.1, ls="-.", label="worst without the\nmirror's offsets")
         ax.axhline(1e3 * limit, color=BAD, lw=0.9, ls="--", label=f"{1e3 * limit:g} mm")
         ax.set_yscale("log")
         ax.set_xlabel("time (s)")
         ax.set_ylabel("miss of the target (mm)")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return figure
+
+
+def error_figure(track: CountTrack, errors: np.ndarray, shares: np.ndarray) -> Figure:
+    """Linear counts less exact ones over the track, azimuth and elevation, of each point that is followed.
+
+    track     followed track
+    errors    (s, k, r, p, 2) counts, of `reduction.steering.tracking.count_errors`
+    shares    (k,) position within each interval
+    """
+    good = track.status == Following.FOLLOWED
+    inside = np.concatenate([[0.0], np.asarray(shares), [1.0]])  # at the nodes the error is zero
+    when = (track.since[:-1, None] + inside * np.diff(track.since)[:, None]).ravel()
+    with styled():
+        figure = Figure(figsize=(8.6, 4.4), layout="constrained")
+        panels = figure.subplots(2, 1, sharex=True)
+        for axis, (ax, name) in enumerate(zip(panels, ("azimuth", "elevation"), strict=True)):
+            between = errors[:, :, good, axis]
+            whole = np.pad(between, ((0, 0), (1, 1), (0, 0))).reshape(len(when), -1)
+            for k, line in enumerate(whole.T[:MOST_PAIRS]):
+                ax.plot(when, line, color=SERIES[k % len(SERIES)], lw=0.9, label=f"point {k}")
+            ax.axhline(0.0, color=FAINT, lw=0.7)
+            ax.set_ylabel(f"{name} (counts)")
+        panels[0].set_title("Linear counts between t0 and t1 less exact counts")
+        panels[1].set_xlabel("time (s)")
+        if good.any():
+            panels[0].legend(loc="center left", bbox_to_anchor=(1.0, 0.0))
+        return figure
+
+
+def mirror_figure(track: CountTrack, mirror_counts: np.ndarray) -> Figure:
+    """Counts at t0 and t1 less those of an ideal mirror over the track, of each point that is followed.
+
+    track           followed track of one ranger
+    mirror_counts   (k + 1, p, 2) counts, of `reduction.steering.ground_track.GroundTrack`
+    """
+    good = track.status[0] == Following.FOLLOWED
+    with styled():
+        figure = Figure(figsize=(8.6, 4.4), layout="constrained")
+        panels = figure.subplots(2, 1, sharex=True)
+        for axis, (ax, name) in enumerate(zip(panels, ("azimuth", "elevation"), strict=True)):
+            for k in np.flatnonzero(good)[:MOST_PAIRS]:
+                ax.plot(track.since, mirror_counts[:, k, axis], color=SERIES[k % len(SERIES)], label=f"point {k}")
+            ax.axhline(0.0, color=FAINT, lw=0.7)
+            ax.set_ylabel(f"{name} (counts)")
+        panels[0].set_title("Counts by the mirror's axis offsets, tilts and encoder errors")
+        panels[1].set_xlabel("time (s)")
+        if good.any():
+            panels[0].legend(loc="center left", bbox_to_anchor=(1.0, 0.0))
         return figure
 
 
@@ -69,8 +130,9 @@ def search_figure(spot: Spot, zeros: tuple[float, float], title: str = "") -> Fi
         ax.set_xlabel("azimuth counts")
         ax.set_ylabel("elevation counts")
         ax.ticklabel_format(useOffset=False)
+        ax.locator_params(axis="x", nbins=6)
         heading = title or (spot.status if len(spot.status) < 90 else f"{spot.status[:87]}...")
-        ax.set_title(f"{heading}: {_centre_text(spot)}" if spot.found else heading, fontsize=8.5)
+        ax.set_title(f"{heading}\n{_centre_text(spot)}" if spot.found else heading, fontsize=8.5)
         return figure
 
 

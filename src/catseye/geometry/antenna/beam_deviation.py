@@ -125,9 +125,3 @@ def subreflector_tilt(of: ApertureNodes, gregorian: Gregorian, pivot: ArrayLike)
     arm = p - np.asarray(pivot, dtype=float)
     turn = np.einsum("mi,mij->mj", normal, -skew(arm))  # n . (w x arm) = n . (-[arm]x w)
     return of.tilt(np.concatenate([normal, turn], axis=1))
-
-
-def receiver_tilt(of: ApertureNodes, gregorian: Gregorian) -> Array:
-    """Wavefront slopes (2, 3), rad/m, for a shift of a second-focus receiver."""
-    path = gregorian.second_focus(of.focus) - gregorian.reflections(of)
-    return of.tilt(path / np.linalg.norm(path, axis=1)[:, None])

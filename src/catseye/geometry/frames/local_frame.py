@@ -7,7 +7,7 @@ directions"), or the plumb line on request. Heights: h above the ellipsoid, H el
 h = H + N. Metric state plane is EPSG:32151; EPSG:26854, the same zone, is in US survey feet and is refused by size.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -173,24 +173,6 @@ class LocalFrame:
         return np.stack([easting, northing, height - self.geoid(latitude, longitude)], axis=-1)
 
 
-def with_zero_at(frame: LocalFrame, latitude: float, longitude: float, height: float) -> LocalFrame:
-    """Frame moved along z until a point lies at z = 0.
-
-    As for the tooling ball of ZY103.
-
-    frame                 with any height of its origin
-    latitude, longitude   rad, of the point
-    height                m, of the point above the ellipsoid
-
-    The point lies above the origin by the curvature: 1.1 mm at 120 m. Done twice, as the scale depends on height: the
-    remainder is below 1e-12 m.
-    """
-    for _ in range(2):
-        above = float(frame.from_geodetic(latitude, longitude, height)[2])
-        frame = replace(frame, height=frame.height + above)
-    return frame
-
-
 def horizon(latitude: ArrayLike, longitude: ArrayLike) -> Floats:
     """Matrix (..., 3, 3) from geocentric vectors to east, north, up.
 
@@ -240,22 +222,6 @@ def radii(latitude: ArrayLike) -> Radii:
     return Radii(SEMI_MAJOR * (1.0 - E2) / w2**1.5, SEMI_MAJOR / np.sqrt(w2))
 
 
-def radius_towards(latitude: ArrayLike, azimuth: ArrayLike) -> Floats:
-    """Radius of curvature of the ellipsoid's normal section, m.
-
-    latitude   rad
-    azimuth    rad, clockwise from north
-
-    Source: [STEM89] (Euler's formula 1/R = cos² A / M + sin² A / N). Exact.
-
-    >>> round(float(radius_towards(0.0, np.pi / 2)), 3)
-    6378137.0
-    """
-    meridian, across = radii(latitude)
-    a = np.asarray(azimuth, dtype=float)
-    return 1.0 / (np.cos(a) ** 2 / meridian + np.sin(a) ** 2 / across)
-
-
 def elevation_factor(latitude: ArrayLike, height: ArrayLike) -> Floats:
     """Elevation factor: length on the ellipsoid over length at a height.
 
@@ -275,23 +241,6 @@ def elevation_factor(latitude: ArrayLike, height: ArrayLike) -> Floats:
     meridian, across = radii(latitude)
     mean = np.sqrt(meridian * across)
     return mean / (mean + np.asarray(height, dtype=float))
-
-
-def fall_of_level(distance: ArrayLike, radius: ArrayLike) -> Floats:
-    """Depth of a level surface below its tangent plane, m.
-
-    distance   m, in that plane from where they touch
-    radius     m, of the surface there
-
-    R - sqrt(R² - d²), written so that nothing cancels; d²/2R is its first term.
-
-    Source: plane geometry. Exact for a sphere.
-
-    >>> round(float(fall_of_level(120.0, 6.37e6)) * 1e3, 3)
-    1.13
-    """
-    d, r = np.asarray(distance, dtype=float), np.asarray(radius, dtype=float)
-    return d**2 / (r + np.sqrt(r**2 - d**2))
 
 
 def _geocentric(latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike) -> Floats:

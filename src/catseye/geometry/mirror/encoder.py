@@ -33,20 +33,6 @@ class Choice(NamedTuple):
     allowed: NDArray[np.bool_]
 
 
-def wrapped(theta: ArrayLike) -> NDArray[np.float64]:
-    """Same direction as an angle (...) in [-pi/2, 3 pi/2).
-
-    theta    (...), rad, any; the result is in rad
-
-    Source: [PARKER04] eq. 2.19. Exact but for the rounding of 2 pi.
-
-    >>> wrapped([-2.0, 0.0, 5.0]).round(6).tolist()
-    [4.283185, 0.0, -1.283185]
-    """
-    shifted = np.mod(np.asarray(theta, dtype=float) + 0.5 * np.pi, TWO_PI)
-    return np.where(shifted >= TWO_PI, 0.0, shifted) - 0.5 * np.pi
-
-
 def azimuth_counts(theta: ArrayLike, na0: ArrayLike) -> NDArray[np.float64]:
     """Azimuth counts (...) for a beam at Theta.
 

@@ -150,25 +150,6 @@ def beam_angles(
     return np.where(settled, theta, np.nan), np.where(settled, phi, np.nan)
 
 
-def axis_offset(direct: ArrayLike, prime: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
-    """Offset (...), m, of the elevation axis, from distances to the mirror.
-
-    It is the offset from the azimuth axis.
-
-    direct, prime   (...), m: from afar to the face at autocollimation, or to the back retroreflector, both pointings
-    phi             (...), rad: angle of the line of sight from the azimuth axis, in which the face (or back) looks
-
-    Seen from afar along u the face lies nearer by s + e sin Phi, in prime by s - e sin Phi: half the difference is
-    e sin Phi, and s drops out. The back retroreflector stands as far behind the axis in both, so the same holds.
-
-    Source: [PARKER04] section 2.4 (after eq. 2.24), corrected: see the top of this file. Exact for a plane wave.
-
-    >>> round(float(axis_offset(29.9995, 30.0005, np.pi / 2)), 6)
-    0.0005
-    """
-    return 0.5 * np.subtract(prime, direct, dtype=float) / np.sin(phi)
-
-
 def _shaped(values: ArrayLike, last: int, what: str) -> NDArray[np.float64]:
     array = np.asarray(values, dtype=float)
     if array.shape[-1:] != (last,):

@@ -315,41 +315,6 @@ def counts_jacobian(station: MirrorStation, points: ArrayLike) -> tuple[NDArray[
     return by_point, np.concatenate([-by_point, by_alpha, -lambda_slope, by_beta, by_zeros], axis=-1)
 
 
-def ray_jacobian(
-    station: MirrorStation, at_counts: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Derivatives of a beam's direction and origin.
-
-    Direction by counts (..., 3, 2) and parameters (..., 3, 13), origin by parameters (..., 3, 13).
-
-    station, at_counts    as for `ray`
-
-    Source: [PARKER04] eq. 2.12 solved for R, differentiated: a turn of axes about e moves a fixed direction u of them
-    by e x u.
-    """
-    n = np.asarray(at_counts, dtype=float)
-    u = beam(station, n)
-    theta = azimuth_angle(n[..., 0], station.zeros[..., 0])
-    phi = elevation_angle(n[..., 1], station.zeros[..., 1])
-    sine, cosine, along, aside = np.sin(phi), np.cos(phi), np.cos(theta), np.sin(theta)
-    by_azimuth = np.stack([-sine * aside, sine * along, 0.0 * theta + 0.0 * sine], axis=-1) / COUNTS_PER_RADIAN
-    by_elevation = np.stack([cosine * along, cosine * aside, -sine + 0.0 * theta], axis=-1) * 2.0 / COUNTS_PER_RADIAN
-    to_ground = np.swapaxes(station.mirror_from_ground, -1, -2)
-    mount_to_ground = np.swapaxes(station.gamma, -1, -2)
-    by_counts = to_ground @ np.stack([by_azimuth, by_elevation], axis=-1)
-    about_mount, about_mirror = _turning_axes(station)
-    in_mount = np.einsum("...ji,...j->...i", station.lambda_, u)
-    by_alpha = mount_to_ground @ np.swapaxes(np.cross(about_mount, in_mount[..., None, :]), -1, -2)
-    by_beta = to_ground @ np.swapaxes(np.cross(about_mirror, u[..., None, :]), -1, -2)
-    zeros = np.zeros((*by_counts.shape[:-1], 3))
-    direction = np.concatenate([zeros, by_alpha, zeros, by_beta, -by_counts], axis=-1)
-    origin_by_alpha = mount_to_ground @ np.swapaxes(np.cross(about_mount, station.offset[..., None, :]), -1, -2)
-    shape = direction.shape[:-2]
-    parts = (np.eye(3), origin_by_alpha, mount_to_ground, np.zeros((3, 4)))
-    origin = np.concatenate([np.broadcast_to(p, (*shape, *p.shape[-2:])) for p in parts], axis=-1)
-    return by_counts, direction, origin
-
-
 def counts_covariance(
     station: MirrorStation, points: ArrayLike, *, of_station: ArrayLike, of_points: ArrayLike | None = None
 ) -> NDArray[np.float64]:
@@ -365,29 +330,6 @@ def counts_covariance(
     answer = by_station @ np.asarray(of_station, dtype=float) @ np.swapaxes(by_station, -1, -2)
     if of_points is not None:
         answer = answer + by_point @ np.asarray(of_points, dtype=float) @ np.swapaxes(by_point, -1, -2)
-    return answer
-
-
-def ray_covariance(
-    station: MirrorStation, at_counts: ArrayLike, *, of_station: ArrayLike, of_counts: ArrayLike | None = None
-) -> NDArray[np.float64]:
-    """Covariance (..., 6, 6) of beam origin, m, and direction, rad.
-
-    Ground axes, in this order.
-
-    station, at_counts   as for `ray`
-    of_station           (..., 13, 13), of `PARAMETERS`, in their units
-    of_counts            (..., 2, 2), counts^2, independent of it; none if None
-
-    The direction's part is of rank two: it stays a unit vector. Source: [JCGM102] eq. 3, first order, `ray_jacobian`.
-    """
-    by_counts, direction, origin = ray_jacobian(station, at_counts)
-    slopes = np.concatenate([origin, direction], axis=-2)
-    answer = slopes @ np.asarray(of_station, dtype=float) @ np.swapaxes(slopes, -1, -2)
-    if of_counts is not None:
-        zeros = np.zeros_like(by_counts)
-        read = np.concatenate([zeros, by_counts], axis=-2)
-        answer = answer + read @ np.asarray(of_counts, dtype=float) @ np.swapaxes(read, -1, -2)
     return answer
 
 

@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.aliases import Array
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.encoder import BEAM_PER_COUNT, COUNTS_PER_TURN
+from catseye.geometry.mirror.encoder import BEAM_PER_COUNT
+from catseye.geometry.mirror.imperfect import Imperfections, imperfect_ray
 from catseye.geometry.mirror.pointing import MirrorStation, ray
 
 HALVINGS = 60  # of an interval: its last bit
@@ -30,7 +31,7 @@ HALVINGS = 60  # of an interval: its last bit
 
 @dataclass(frozen=True, eq=False)
 class CountLine:
-    """Counts at constant rates, (...) lines; `count_line` makes one.
+    """Counts at constant rates, (...) lines.
 
     start, end    (..., 2) counts (Na, Ne) at t0 and t1, azimuth on the same turn
     interval      (...) s, t1 - t0, above 0
@@ -50,51 +51,30 @@ class CountLine:
     def at(self, since: ArrayLike) -> Array:
         """Counts (..., 2), real numbers, at seconds after t0; broadcasts against the lines.
 
-        >>> count_line([0.0, 100.0], [32.0, 90.0], 0.128).at(0.064).tolist()
+        >>> CountLine(np.array([0.0, 100.0]), np.array([32.0, 90.0]), np.array(0.128)).at(0.064).tolist()
         [16.0, 95.0]
         """
         share = np.asarray(since, dtype=float) / self.interval
         return self.start + (self.end - self.start) * share[..., None]
 
 
-def count_line(start: ArrayLike, end: ArrayLike, interval: ArrayLike) -> CountLine:
-    """Line between two pointings, azimuth by the shorter turn.
-
-    It does not jump where Theta wraps.
-
-    start, end    (..., 2) counts (Na, Ne), both direct or both prime
-    interval      (...) s, above 0
-
-    A target that crosses Theta = -pi/2 has counts a whole turn apart on either side. The line stays on the turn of its
-    start; `encoder.within` tests its end against the stops. Raises ValidityError for a bad interval.
-
-    Source: [PARKER04] eqs. 2.45, 2.46; with the wrap of 2.19 removed.
-
-    >>> count_line([74_990.0, 0.0], [-24_990.0, 0.0], 1.0).end.tolist()
-    [75010.0, 0.0]
-    """
-    first, last = _shaped(start, 2, "start counts"), _shaped(end, 2, "end counts")
-    h = np.asarray(interval, dtype=float)
-    if not np.all((h > 0.0) & (h < np.inf)):
-        raise ValidityError(f"interval {h[~((h > 0.0) & (h < np.inf))].flat[0]} s is not above 0: t1 must follow t0")
-    first, last, h2 = np.broadcast_arrays(first, last, h[..., None])
-    turn = np.array([COUNTS_PER_TURN, 0.0])
-    turns = np.rint((last[..., :1] - first[..., :1]) / COUNTS_PER_TURN)
-    return CountLine(first, last - turns * turn, h2[..., 0])
-
-
-def miss(station: MirrorStation, counts: ArrayLike, points: ArrayLike) -> Array:
+def miss(
+    station: MirrorStation, counts: ArrayLike, points: ArrayLike, imperfections: Imperfections | None = None
+) -> Array:
     """Distance (...), m, of the beam from a point.
 
     From a point behind the mirror, to the beam's start.
 
-    station    ranger(s), broadcast against the others
-    counts     (..., 2) Na, Ne, direct or prime
-    points     (..., 3), m, ground frame
+    station         ranger(s), broadcast against the others
+    counts          (..., 2) Na, Ne, direct or prime
+    points          (..., 3), m, ground frame
+    imperfections   of the mirror(s): the beam starts on the face, where the offsets put it; None: an ideal mirror
 
-    Source: [PARKER04] eqs. 2.12-2.22 turned round (`pointing.ray`), and the distance of a point from a ray. Exact.
+    Source: [PARKER04] eqs. 2.12-2.22 turned round (`pointing.ray`, `imperfect.imperfect_ray`), and the distance of a
+    point from a ray. Exact.
     """
-    origin, direction = ray(station, np.asarray(counts, dtype=float))
+    n = np.asarray(counts, dtype=float)
+    origin, direction = ray(station, n) if imperfections is None else imperfect_ray(station, imperfections, n)
     away = np.asarray(points, dtype=float) - origin
     opposite = np.sum(away * direction, axis=-1) < 0.0
     passed = np.linalg.norm(np.cross(away, direction), axis=-1)
@@ -131,53 +111,6 @@ def apparent_motion(
         return np.asarray(np.einsum("...ij,...j->...i", m, x))
 
     return turned(r), turned(seen_v), turned(seen_a)
-
-
-def count_motion(vector: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> tuple[Array, Array]:
-    """Rates (..., 2), counts/s, and curvatures (..., 2), counts/s^2, of a target.
-
-    Of (Na, Ne), direct pointing.
-
-    vector, velocity, acceleration   (..., 3), m, m/s, m/s^2, mirror axes, from `apparent_motion`
-
-    In the prime pointing the azimuth's are the same and the elevation's have the other sign (eq. 2.26). On the azimuth
-    axis itself they are undefined: NaN or infinity.
-
-    Source: [PARKER04] eqs. 2.14, 2.15, 2.21, 2.22, differentiated twice. Exact.
-
-    >>> count_motion([0.0, 120.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0])[0].round(4).tolist()
-    [-132.6291, 0.0]
-    """
-    p, v, a = (_shaped(x, 3, "vector, velocity or acceleration") for x in (vector, velocity, acceleration))
-    x, y, z = np.moveaxis(p, -1, 0)
-    (vx, vy, vz), (ax, ay, az) = np.moveaxis(v, -1, 0), np.moveaxis(a, -1, 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rho2 = x**2 + y**2
-        rho, r2 = np.sqrt(rho2), x**2 + y**2 + z**2
-        inward = x * vx + y * vy  # rho rho'
-        theta_rate = (x * vy - y * vx) / rho2
-        theta_curve = (x * ay - y * ax) / rho2 - 2.0 * theta_rate * inward / rho2
-        rho_rate = inward / rho
-        rho_curve = (vx**2 + vy**2 + x * ax + y * ay - rho_rate**2) / rho
-        phi_rate = (z * rho_rate - rho * vz) / r2
-        phi_curve = (z * rho_curve - rho * az) / r2 - 2.0 * phi_rate * (inward + z * vz) / r2
-    rates = np.stack([theta_rate, phi_rate], axis=-1) / BEAM_PER_COUNT
-    return rates, np.stack([theta_curve, phi_curve], axis=-1) / BEAM_PER_COUNT
-
-
-def line_estimate(curvature: ArrayLike, interval: ArrayLike) -> Array:
-    """Mid-interval error (..., 2), counts, of the line, to first order.
-
-    curvature    (..., 2), counts/s^2, of (Na, Ne), from `count_motion`
-    interval     (...) s
-
-    Source: remainder of linear interpolation. For nearly constant curvatures; not a limit.
-
-    >>> line_estimate([8.0, -4.0], 0.5).tolist()
-    [0.25, 0.125]
-    """
-    h = np.asarray(interval, dtype=float)
-    return np.abs(np.asarray(curvature, dtype=float)) * h[..., None] ** 2 / 8.0
 
 
 def line_bound(

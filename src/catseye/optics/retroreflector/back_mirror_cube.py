@@ -85,6 +85,6 @@ class BackMirrorCube:
         """Returned share of the cube behind the mirror."""
         return self.cube.return_share(incidence, azimuth)
 
-    def sectors(self, incidence: float, azimuth: float = 0.0) -> Sectors:
+    def sectors(self, incidence: ArrayLike, azimuth: ArrayLike = 0.0) -> Sectors:
         """Sectors of the cube behind the mirror."""
         return self.cube.sectors(incidence, azimuth)

@@ -35,6 +35,7 @@ class WrittenPose:
     correction_covariance   (3, 3) of it
     verdict      of the pose
     digest       SHA-256 of the file
+    pivot, translation   (3,) m, of the rotation, and its shift
     """
 
     file: str
@@ -46,6 +47,8 @@ class WrittenPose:
     correction_covariance: np.ndarray | None
     verdict: Verdict | None
     digest: str
+    pivot: np.ndarray | None = None
+    translation: np.ndarray | None = None
 
     @property
     def posture(self) -> tuple[float, float] | None:
@@ -79,6 +82,8 @@ def read_written_pose(
         correction_covariance=_numbers(file, beam, "covariance", (3, 3), of="pointing."),
         verdict=stored_verdict(file, document),
         digest=folder.hashes[path.name],
+        pivot=_numbers(file, document, "pivot", (3,)),
+        translation=_numbers(file, document, "translation", (3,)),
     )
 
 

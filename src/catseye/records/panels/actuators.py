@@ -66,18 +66,34 @@ class ActuatorCorrection(Record):
 def read_positions(path: Path | str) -> dict[str, float]:
     """Travel of each actuator, mm, by name; InputError for an invalid file or a repeated name.
 
-    path   CSV with the header actuator,position_mm
+    path   CSV with the header actuator,position_mm; or actuators.csv of `catseye surface`, whose whole steps were made:
+           the travel is then that after them, from 0 where that table knew no position
+
+    Raises InputError too for a table of corrections with a target beyond its actuator's limits, which no step reaches.
     """
     path = Path(path)
     positions: dict[str, float] = {}
-    for row, record in enumerate(Folder(path.parent).table(path.name, ActuatorPosition), start=1):
-        if record.actuator in positions:
-            raise refusal(path.name, f"row {row}, actuator = {shown(record.actuator)} is given twice (expected once)")
-        positions[record.actuator] = record.position_mm
+    earlier = _corrections(path)
+    table = Folder(path.parent).table(path.name, ActuatorPosition) if earlier is None else ()
+    rows = earlier or {n: (record.actuator, record.position_mm) for n, record in enumerate(table, start=1)}
+    for row, (actuator, position_mm) in rows.items():
+        if actuator in positions:
+            raise refusal(path.name, f"row {row}, actuator = {shown(actuator)} is given twice (expected once)")
+        positions[actuator] = position_mm
     return positions
 
 
-def read_corrections(path: Path | str) -> list[ActuatorCorrection]:
-    """Corrections of a table from `catseye surface --actuators`; InputError for other files."""
-    path = Path(path)
-    return Folder(path.parent).table(path.name, ActuatorCorrection)
+def _corrections(path: Path) -> dict[int, tuple[str, float]] | None:
+    """Actuator and travel after its whole steps, mm, by row of a table of corrections; None for another table."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            if "target_mm" not in file.readline().split(","):
+                return None
+    except OSError:  # refused by the reader of positions
+        return None
+    rows = Folder(path.parent).table(path.name, ActuatorCorrection)
+    for row, one in enumerate(rows, start=1):
+        if one.within_limits == "no":
+            text = f"row {row}, actuator {shown(one.actuator)} cannot reach target_mm = {one.target_mm:g}"
+            raise refusal(path.name, f"{text}, so that its position is unknown (expected positions as read)")
+    return {n: (one.actuator, one.target_mm - one.left_mm) for n, one in enumerate(rows, start=1)}

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from catseye.constants import TWO_PI
-from catseye.records.files.record import Certificate, Name, Uncertainty, Version, Within, broken_rule
+from catseye.records.files.record import Certificate, Name, Record, Uncertainty, Version, Within, broken_rule
 
 Counts = Annotated[int, Within(-1_000_000, 1_000_000)]  # 100 000 per turn
 Zero = Annotated[int | float, Within(-1_000_000, 1_000_000)]  # counts; a calibration gives fractions
@@ -15,6 +15,7 @@ Tilt = Annotated[float, Within(-0.1, 0.1)]
 PositiveVolts = Annotated[float, Within(0, 10, above=True)]
 AxisOffset = Annotated[float, Within(-10, 10)]  # mm
 Cycle = Annotated[float, Within(-1, 1)]  # mm
+PerVolt = Annotated[float, Within(-0.05, 0.05)]  # 1/V: ten volts are half the light
 SmallTilt = Annotated[float, Within(-0.05, 0.05)]
 UncertainTilt = Annotated[float, Within(0, 0.05, above=True)]
 UncertainCounts = Annotated[float, Within(0, 1000, above=True)]
@@ -29,6 +30,8 @@ UNCERTAIN = (
     (("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm"), "u_axis_mm"),
     (("amplitude_to_phase_rad",), "u_amplitude_to_phase_rad"),
     (("cyclic_cosine_mm", "cyclic_sine_mm"), "u_cyclic_mm"),
+    (("second_pass_cosine_per_volt", "second_pass_sine_per_volt"), "u_second_pass_per_volt"),
+    (("detector_lag_rad", "image_offset_um"), "u_image_um"),
     (("azimuth_encoder_cosine_counts", "azimuth_encoder_sine_counts"), "u_encoder_counts"),
     (("elevation_encoder_cosine_counts", "elevation_encoder_sine_counts"), "u_encoder_counts"),
     (("face_tilt_rad", "beam_tilt_x_rad", "beam_tilt_y_rad"), "u_tilt_rad"),
@@ -38,6 +41,20 @@ PAIRED = (
     ("azimuth_encoder_cosine_counts", "azimuth_encoder_sine_counts"),
     ("elevation_encoder_cosine_counts", "elevation_encoder_sine_counts"),
 )
+
+
+class HeadFrequency(Record):
+    """[[frequency]]: a further modulation frequency of the head, beside that of site.toml.
+
+    modulation_hz                              frequency of the modulation
+    leakage_amplitude_volt, leakage_phase_rad  amplitude and phase of the leakage at it
+    u_leakage_volt                             of each quadrature of the leakage
+    """
+
+    modulation_hz: Annotated[float, Within(1e6, 1e11)]
+    leakage_amplitude_volt: Annotated[float, Within(0, 10)]
+    leakage_phase_rad: Annotated[float, Within(-TWO_PI, TWO_PI)]
+    u_leakage_volt: PositiveVolts
 
 
 class MirrorGeometry(Certificate):
@@ -69,6 +86,15 @@ class MirrorGeometry(Certificate):
     cyclic_cosine_mm, cyclic_sine_mm   terms of the range error (positive: too long), orders 1, 2, ... of the phase
                                        after the electronics'
     u_cyclic_mm                        of each cyclic term; without terms it stands for orders 1 and 2, expected zero
+    second_pass_cosine_per_volt, second_pass_sine_per_volt  light that the detector sends out again: turn of the phase
+                                       for each volt of return, range too long, of the cosine and sine of the phase
+                                       after the electronics'
+    u_second_pass_per_volt             of each of both
+    u_feedback_rad                     of the phase of one shot by light back into the laser, by itself
+    detector_radius_mm                 radius of the detector's active disc
+    detector_lag_rad                   phase by which the signal of the disc's centre is later than that of its rim
+    image_offset_um                    mean place of the images from the centre of the disc
+    u_image_um                         of each coordinate of one shot's image about the mean place, by itself
     na0, ne0                           encoder counts of azimuth and elevation at zero
     u_zero_counts                      of each of `na0` and `ne0`
     azimuth_encoder_cosine_counts, azimuth_encoder_sine_counts  orders 1, 2, ... of the encoder's error, positive if
@@ -126,6 +152,14 @@ class MirrorGeometry(Certificate):
     cyclic_cosine_mm: Annotated[tuple[Cycle, ...], Field(strict=False, max_length=8)] = ()
     cyclic_sine_mm: Annotated[tuple[Cycle, ...], Field(strict=False, max_length=8)] = ()
     u_cyclic_mm: Uncertainty | None = None
+    second_pass_cosine_per_volt: PerVolt = 0.0
+    second_pass_sine_per_volt: PerVolt = 0.0
+    u_second_pass_per_volt: Annotated[float, Within(0, 0.1, above=True)] | None = None
+    u_feedback_rad: Annotated[float, Within(0, 0.1, above=True)] | None = None
+    detector_radius_mm: Annotated[float, Within(1e-3, 50)] | None = None
+    detector_lag_rad: Annotated[float, Within(-0.5, 0.5)] = 0.0
+    image_offset_um: Annotated[float, Within(0, 50_000)] = 0.0
+    u_image_um: Annotated[float, Within(0, 1000, above=True)] | None = None
     na0: Zero
     ne0: Zero
     u_zero_counts: UncertainCounts | None = None
@@ -175,6 +209,19 @@ class MirrorGeometry(Certificate):
         return self
 
     @model_validator(mode="after")
+    def _has_its_images_on_the_detector(self) -> Self:
+        keys = sorted(("detector_radius_mm", "u_image_um"), key=lambda key: getattr(self, key) is not None)
+        if (self.u_image_um is None) != (self.detector_radius_mm is None):
+            raise broken_rule(f"{keys[0]} is missing beside {keys[1]} (expected both or none)")
+        reach = self.image_offset_um + 3.0 * (self.u_image_um or 0.0)
+        if self.detector_radius_mm is not None and reach > self.detector_radius_mm * 1e3:
+            raise broken_rule(
+                f"image_offset_um + 3 u_image_um = {reach:g} um is beyond the disc (expected up to "
+                f"{self.detector_radius_mm * 1e3:g}, by detector_radius_mm)"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _has_a_sine_for_each_cosine(self) -> Self:
         for cosine, sine in PAIRED:
             cosines, sines = len(getattr(self, cosine)), len(getattr(self, sine))
@@ -204,6 +251,7 @@ class Mirror(MirrorGeometry):
     cyclic_cosine_mm, cyclic_sine_mm  terms of the range error (positive: too long), orders 1, 2, ... of the phase after
                         the electronics', with u_cyclic_mm of each; without terms it stands for orders 1 and 2
     azm_zrg, elv_zrg    counts that point at the cube
+    frequency           further modulation frequencies, each with its leakage; D0 is a length, the same at all
 
     The scan point is where the axes should meet: on the azimuth axis, nearest to the elevation axis. D0 is a distance
     between two points; the effect of offsets on the path to the cube, at azm_zrg and elv_zrg, is not included.
@@ -217,3 +265,19 @@ class Mirror(MirrorGeometry):
     u_offset_mm: Uncertainty
     azm_zrg: Counts
     elv_zrg: Counts
+    frequency: Annotated[tuple[HeadFrequency, ...], Field(strict=False)] = ()
+
+    @model_validator(mode="after")
+    def _has_each_frequency_once(self) -> Self:
+        modulations = [further.modulation_hz for further in self.frequency]
+        for hz in modulations:
+            if modulations.count(hz) > 1:
+                raise broken_rule(f"frequency: modulation_hz = {hz:.10g} is given twice (expected each once)")
+        return self
+
+    def at_modulation(self, modulation_hz: float) -> Self:
+        """Sheet with the leakage at one of its frequencies; unchanged at the site's."""
+        for further in self.frequency:
+            if further.modulation_hz == modulation_hz:
+                return self.model_copy(update=further.model_dump(exclude={"modulation_hz"}))
+        return self

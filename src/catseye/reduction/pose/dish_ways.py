@@ -96,6 +96,7 @@ def solved_points(reduction: Reduction) -> SolvedPoints:
         covariance=coordinates.joint,
         posture=angles,
         hashes=reduction.campaign.hashes,
+        unchecked=coordinates.unchecked,
     )
 
 

@@ -139,14 +139,17 @@ def pose_of_group(
     pivot     (3,) m, in that frame; by default that of the group, or the points' mean
     robust    as `estimation.shapes.pose.fit_pose`
 
-    Two epochs count as independent: shared errors, such as of the monuments' survey and a ranger's zero, make a change
-    more certain than stated. Raises InputError where points or postures are missing, EstimationError as `fit_pose`.
+    Of a group, points that nothing checks (`SolvedPoints.unchecked`) are left out. Two epochs count as independent:
+    shared errors, such as of the monuments' survey and a ranger's zero, make a change more certain than stated. Raises
+    InputError where points or postures are missing, EstimationError as `fit_pose`.
     """
     if (group is None) == (points is None):
         raise InputError("a pose needs a group or points by name (expected one of the two)")
     names = tuple(points) if points is not None else group_names(str(group), site)
     site_places = places_of(site)
-    have = [n for n in names if n in later.names and (n in site_places if earlier is None else n in earlier.names)]
+    unchecked = set() if group is None else {*later.unchecked, *(() if earlier is None else earlier.unchecked)}
+    both = set(later.names) & (set(site_places) if earlier is None else set(earlier.names))
+    have = [n for n in names if n in both and n not in unchecked]
     missing = tuple(n for n in names if n not in have)
     if points is not None and missing:
         where = "the epoch and the design" if earlier is None else "both epochs"

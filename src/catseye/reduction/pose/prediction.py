@@ -1,6 +1,6 @@
 """Predicted encoder corrections of a pointing series."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ class PointingPrediction:
     covariance   (..., 2, 2) rad^2; None where the model has none
     encoders     azimuth and elevation (...) rad
     verdict      no better than the model's
+    structure    (..., 2) rad, part of the correction by a structural model; None without one
     """
 
     model: str
@@ -28,6 +29,7 @@ class PointingPrediction:
     covariance: np.ndarray | None
     encoders: tuple[np.ndarray, np.ndarray]
     verdict: Verdict
+    structure: np.ndarray | None = None
 
     @property
     def u(self) -> np.ndarray | None:
@@ -54,4 +56,23 @@ def predict_pointing(model: NamedSeries, azimuth: ArrayLike, elevation: ArrayLik
         covariance=series.covariance_of_correction(a, e) if has_covariance else None,
         encoders=series.encoders(a, e),
         verdict=Verdict("good", "the series of the model").resting_on({model.name: model.verdict}),
+    )
+
+
+def with_structure(
+    prediction: PointingPrediction, correction: np.ndarray, covariance: np.ndarray
+) -> PointingPrediction:
+    """Prediction with the correction by a structural model added.
+
+    prediction   of directions (...)
+    correction   (..., 2) rad, `reduction.structure.beam.BeamOffset.correction` in these postures
+    covariance   (..., 2, 2) rad^2; added where the series has a covariance, else u stays unknown
+    """
+    a, e = prediction.encoders
+    return replace(
+        prediction,
+        correction=prediction.correction + correction,
+        covariance=None if prediction.covariance is None else prediction.covariance + covariance,
+        encoders=(a + correction[..., 0] / np.cos(prediction.elevation), e + correction[..., 1]),
+        structure=correction,
     )

@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from catseye.geometry.antenna.rigid_telescope import RigidTelescope
 from catseye.records.site.keep_out import KeepOut
-from catseye.records.site.mirror import MirrorGeometry
-from catseye.records.site.monument import MonumentGeometry
 from catseye.records.site.solids import Solids
-from catseye.reduction.site.stations import Pointings, point, station_of
-from catseye.reduction.steering.sighting import Sighting, place_of_monument, seen_from, sightings
+from catseye.reduction.site.stations import Pointings, pointings_of
+from catseye.reduction.steering.mounted import MountedRanger
+from catseye.reduction.steering.sighting import Sighting, place_of_ranger, seen_from, sightings
 from catseye.reduction.steering.visibility import Visibility
 from catseye.verdict import Verdict, worst
 
@@ -82,25 +82,29 @@ class AimedPoints:
         return Verdict(verdict.word, f"{bad} of {len(verdicts)} points, first ({place}): {verdict.why}")
 
 
-def aim_mirror(
-    monument: MonumentGeometry, mirror: MirrorGeometry, to: np.ndarray, surroundings: BeamSurroundings
+def aim_ranger(
+    ranger: MountedRanger, to: np.ndarray, surroundings: BeamSurroundings, telescope: RigidTelescope | None = None
 ) -> AimedPoints:
-    """Aim a mirror at points (n, 3), m, ground.
+    """Aim a ranger's mirror at points (n, 3), m, ground.
 
     surroundings   time, place and things that the beams may meet
+    telescope      at its posture, for a ranger of the feed arm
 
     Raises InputError for a point that no setting reaches, a place of the site that is unknown, and for a solid on the
-    telescope without its posture. Source: [PARKER04] section 2.
+    telescope without its posture. Source: [PARKER04] sections 2 and 2.6.1.
     """
-    pointings, station, scene = point(monument, mirror, to), station_of(monument, mirror), surroundings
+    station, scene, mirror = ranger.station(telescope), surroundings, ranger.mirror
+    pointings = pointings_of(
+        station, mirror, to, name=ranger.name, spread=lambda at: ranger.counts_covariance(station, at)
+    )
     checked: list[Sighting] = []
     if scene.mjd is not None or scene.keep_out.box:
-        place = None if scene.mjd is None else place_of_monument(monument, scene.longitude_deg, scene.latitude_deg)
+        place = None if scene.mjd is None else place_of_ranger(ranger, scene.longitude_deg, scene.latitude_deg)
         checked = sightings(
             station,
             mirror,
             pointings.counts,
-            name=monument.monument,
+            name=ranger.name,
             mjd=scene.mjd,
             place=place,
             keep_out=scene.keep_out,
@@ -109,7 +113,7 @@ def aim_mirror(
     if scene.kind is not None or scene.facing is not None or scene.solids is not None:
         visibility = seen_from(
             station,
-            monument.monument,
+            ranger.name,
             to,
             kind=scene.kind or USUAL_KIND,
             facing=scene.facing,

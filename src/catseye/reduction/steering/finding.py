@@ -1,8 +1,7 @@
 """Target search by its return: spiral, scan, fitted spot.
 
-    find               the whole search, from a predicted pointing and a measuring function; the spot by `spot_fit`
-    found_point        the target's place, from its counts and a known range
-    search_results     a table of the results; adjustment_readings the one for the adjustment of zeros and angles
+    find                  the whole search, from a predicted pointing and a measuring function; the spot by `spot_fit`
+    adjustment_readings   a table of the results, for the adjustment of zeros and angles
 
 A target that is not found is a status with the searched area, never an exception.
 """
@@ -15,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from catseye.aliases import Array
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.pointing import MirrorStation, ray, ray_jacobian
 from catseye.geometry.mirror.search_pattern import LEAST_REACH, Pattern, count_size, offsets_of_counts, raster, spiral
 from catseye.geometry.sky.time_tag import TimeTag
 from catseye.optics.spot import reach
@@ -26,15 +24,6 @@ Allowed = Callable[[Array, Array], bool]  # from counts (2,) to counts (2,), now
 
 WIDER = 1.6  # half a scan's width over the spot's radius
 RECENTRED = 3  # scans at most
-COLUMNS = (
-    "target",
-    "azimuth_counts",
-    "elevation_counts",
-    "u_azimuth_counts",
-    "u_elevation_counts",
-    "amplitude_volt",
-    "mjd",
-)
 
 
 def find(
@@ -127,36 +116,6 @@ def _centred(
     return spot
 
 
-def found_point(
-    station: MirrorStation, spot: Spot, distance: float, *, u_distance: float, of_station: ArrayLike | None = None
-) -> tuple[Array, Array]:
-    """Place of a target by its counts at a known distance.
-
-    (3,) m, ground, and its covariance (3, 3).
-
-    station       the ranger
-    spot          of the target
-    distance      m from the scan point, above 0; u_distance m
-    of_station    (13, 13) covariance of the station's parameters; zero if None
-
-    Raises ValidityError for a spot that was not found.
-
-    Source: [PARKER04] eqs. 2.12-2.22 turned round; [JCGM102] first order.
-    """
-    if not spot.found:
-        raise ValidityError(f"no point for a target that was {spot.status}")
-    if not (0.0 < distance < np.inf and 0.0 <= u_distance < np.inf):
-        raise ValidityError(f"distance {distance} m, u {u_distance} m: expected above 0, and 0 or more")
-    origin, direction = ray(station, spot.counts)
-    by_counts, turned, moved = ray_jacobian(station, spot.counts)
-    slope = distance * by_counts
-    covariance = slope @ spot.covariance @ slope.T + u_distance**2 * np.outer(direction, direction)
-    if of_station is not None:
-        combined = moved + distance * turned
-        covariance = covariance + combined @ np.asarray(of_station, dtype=float) @ combined.T
-    return origin + distance * direction, covariance
-
-
 @dataclass(frozen=True, eq=False)
 class SearchResult:
     """Result of the search for one target: name, spot with status, time."""
@@ -164,25 +123,6 @@ class SearchResult:
     target: str
     spot: Spot
     when: TimeTag
-
-
-def search_results(results: Sequence[SearchResult]) -> str:
-    """CSV text of found targets.
-
-    Real counts with their standard uncertainties, V, and an MJD to the microsecond.
-
-    Targets that were not found have no row. Raises ValidityError where none was found.
-    """
-    hits = [result for result in results if result.spot.found]
-    if not hits:
-        raise ValidityError(f"none of {len(results)} targets was found: there is no table of search results to write")
-    lines = [",".join(COLUMNS)]
-    _refuse_commas(hits)
-    for result in hits:
-        spot, u = result.spot, result.spot.u_counts
-        numbers = [*(f"{n:.3f}" for n in spot.counts), *(f"{v:.4f}" for v in u), f"{spot.amplitude:.4f}"]
-        lines.append(",".join([result.target, *numbers, result.when.text()]))
-    return "\n".join(lines) + "\n"
 
 
 def adjustment_readings(results: Sequence[SearchResult], places: Mapping[str, ArrayLike], ne0: float) -> str:

@@ -1,19 +1,22 @@
-"""Track of moving points by one mirror on the ground."""
+"""Track of moving points by one mirror, on the ground or on the feed arm."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from catseye.geometry.antenna.rigid_telescope import BELOW_ELEVATION, RigidTelescope
 from catseye.geometry.sky.time_tag import TimeTag
-from catseye.records.site.mirror import MirrorGeometry
-from catseye.records.site.monument import MonumentGeometry
-from catseye.reduction.site.stations import station_of
+from catseye.reduction.site.stations import imperfections_of
+from catseye.reduction.steering.mounted import MountedRanger
 from catseye.reduction.steering.tracking import (
     AntennaPath,
     CountTrack,
     Following,
+    carried,
+    count_errors,
     fixed,
     follow,
+    ideal_track,
     misses,
     mounted,
 )
@@ -24,12 +27,20 @@ from catseye.verdict import Verdict
 class GroundTrack:
     """Track of one mirror over n points.
 
-    track    counts at the ends of each interval
-    misses   (s, k, n) m, distances of the beam from its target at s instants of each interval
+    track    counts at the ends of each interval, with the axis offsets, tilts and encoder errors of the mirror's record
+    misses   (k, s, n) m, distances of the beam from its target at s instants of each interval
+    errors   (k, s, n, 2) linear counts less exact ones at these instants
+    ranger   that follows
+    ideal    the same by a mirror without offsets, tilts and encoder errors; None where the record has none
+    ideal_misses   (k, s, n) m, of this mirror's beam at the ideal mirror's counts; `misses` where the record has none
     """
 
     track: CountTrack
     misses: np.ndarray
+    errors: np.ndarray
+    ranger: MountedRanger
+    ideal: CountTrack | None
+    ideal_misses: np.ndarray
 
     @property
     def followed(self) -> np.ndarray:
@@ -44,12 +55,27 @@ class GroundTrack:
     @property
     def counts(self) -> np.ndarray:
         """Counts (k + 1, n, 2) at the ends of the intervals."""
-        return np.concatenate([self.track.lines.start, self.track.lines.end[-1:]])[:, 0]
+        return _nodes(self.track)
+
+    @property
+    def mirror_counts(self) -> np.ndarray:
+        """Counts (k + 1, n, 2) less those of an ideal mirror; 0 where the record is one."""
+        return np.zeros_like(self.counts) if self.ideal is None else self.counts - _nodes(self.ideal)
+
+    @property
+    def worst_ideal(self) -> np.ndarray:
+        """Largest miss (n,), m, at the counts of an ideal mirror; nan for a point that is not followed."""
+        return np.where(self.followed, self.ideal_misses.max(axis=(0, 1)), np.nan)
 
     @property
     def worst(self) -> np.ndarray:
         """Largest miss (n,), m; nan for a point that is not followed."""
         return np.where(self.followed, self.misses.max(axis=(0, 1)), np.nan)
+
+    @property
+    def worst_counts(self) -> np.ndarray:
+        """Largest error (n, 2), counts, of azimuth and elevation; nan for a point that is not followed."""
+        return np.where(self.followed[:, None], np.abs(self.errors).max(axis=(0, 1)), np.nan)
 
     @property
     def verdict(self) -> Verdict:
@@ -63,9 +89,8 @@ class GroundTrack:
         return Verdict("doubtful", text)
 
 
-def follow_points(
-    monument: MonumentGeometry,
-    mirror: MirrorGeometry,
+def follow_by(
+    ranger: MountedRanger,
     points: np.ndarray,
     *,
     frame: str,
@@ -73,17 +98,48 @@ def follow_points(
     start: TimeTag,
     interval: float,
 ) -> GroundTrack:
-    """Follow points (n, 3), m, fixed in a frame of the telescope.
+    """Follow points (n, 3), m, fixed in a frame of the telescope, by a ranger on the ground or on the feed arm.
 
-    frame      "ground", "alidade", "elevation" or "reflector"
+    frame      one of `geometry.antenna.rigid_telescope.FRAMES`
     path       of the telescope, to its end
     start      UTC at the first interval's begin
     interval   s, a buffer's length
 
-    Source: [PARKER04] section 2.6.
+    Frames beyond the reflector, the subreflector's at rest, and the feed arm do not move against it.
+
+    Source: [PARKER04] sections 2.6 and 2.6.1; offsets between the mirror's axes and face, section 2.4.
     """
     intervals = max(1, int(np.ceil(max(path.azimuth.duration, path.elevation.duration) / interval)))
-    stations, targets = mounted(station_of(monument, mirror)[None]), fixed(points, frame, path)
-    limits = (mirror.az_low_limit, mirror.az_high_limit)
-    track = follow(stations, targets, start, intervals=intervals, interval=interval, limits=limits)
-    return GroundTrack(track, misses(track, stations, targets)[:, :, 0])
+    telescope = RigidTelescope(
+        azimuth=float(path.azimuth.at(0.0)[0]),
+        elevation=float(path.elevation.at(0.0)[0]),
+        elevation_axis_height=path.elevation_axis_height,
+        reflector_to_elevation=path.reflector_to_elevation,
+    )
+    if frame not in (*BELOW_ELEVATION, "elevation", "reflector"):
+        points, frame = telescope.between("reflector", frame).points(points), "reflector"
+    station = ranger.station(telescope)[None]
+    stations, targets = carried(station, path, 0.0) if ranger.moves else mounted(station), fixed(points, frame, path)
+    limits = (ranger.mirror.az_low_limit, ranger.mirror.az_high_limit)
+    imperfections = imperfections_of(ranger.mirror)
+    track = follow(
+        stations, targets, start, intervals=intervals, interval=interval, limits=limits, imperfections=imperfections
+    )
+    passed = misses(track, stations, targets, imperfections=imperfections)
+    ideal, passed_ideal = None, passed
+    if imperfections is not None:
+        ideal = ideal_track(track, stations, targets)
+        passed_ideal = misses(ideal, stations, targets, imperfections=imperfections)
+    return GroundTrack(
+        track,
+        passed[:, :, 0],
+        errors=count_errors(track, stations, targets, imperfections=imperfections)[:, :, 0],
+        ranger=ranger,
+        ideal=ideal,
+        ideal_misses=passed_ideal[:, :, 0],
+    )
+
+
+def _nodes(track: CountTrack) -> np.ndarray:
+    """Counts (k + 1, n, 2) of the only ranger at the ends of the intervals."""
+    return np.concatenate([track.lines.start, track.lines.end[-1:]])[:, 0]

@@ -17,10 +17,12 @@ from catseye.optics.retroreflector.kinds.registry import kind_named
 from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.mirror import MirrorGeometry
 from catseye.records.site.monument import MonumentGeometry
+from catseye.records.site.site import Location
 from catseye.records.site.solids import Solids
 from catseye.reduction.site.earth_rotation import FramePlace, standard_pressure_hpa, sun_at
 from catseye.reduction.site.stations import imperfections_of
 from catseye.reduction.steering.guard import GuardAnswer, guard_of
+from catseye.reduction.steering.mounted import MountedRanger
 from catseye.reduction.steering.visibility import Retroreflectors, Visibility, frames_at, visibility
 
 ANY_PACE = Pace((1.0, 1.0), (1.0, 1.0))  # the axes' speeds do not matter for a pointing
@@ -55,20 +57,48 @@ def place_of_monument(
 
     Raises InputError where neither has it, and for an invalid place.
     """
+    return _place(monument.monument, monument, None, longitude_deg, latitude_deg)
+
+
+def place_of_ranger(ranger: MountedRanger, longitude_deg: float | None, latitude_deg: float | None) -> FramePlace:
+    """Place of a ranger's site on Earth: by options, its monument's record, or its site's.
+
+    With standard air, for the Sun's refraction.
+
+    Raises InputError where none has it, and for an invalid place.
+    """
+    located = None if ranger.site is None else ranger.site.site.site
+    return _place(ranger.name, ranger.monument, located, longitude_deg, latitude_deg)
+
+
+def _place(
+    name: str,
+    monument: MonumentGeometry | None,
+    located: Location | None,
+    longitude_deg: float | None,
+    latitude_deg: float | None,
+) -> FramePlace:
+    """Place of a ranger: each angle from the first that has it."""
+    sources = (monument, located)
     options = {"latitude_deg": latitude_deg, "longitude_deg": longitude_deg}
-    angles = {key: getattr(monument, key) if value is None else value for key, value in options.items()}
+    angles = {key: _first(value, *(getattr(each, key, None) for each in sources)) for key, value in options.items()}
     for key, limits in (("latitude_deg", (-90.0, 90.0)), ("longitude_deg", (-180.0, 360.0))):
         value = angles[key]
         if value is not None and not limits[0] <= value <= limits[1]:
             raise InputError(f"{key} = {value:g} is outside {limits[0]:g} to {limits[1]:g} (degrees)")
         if value is None:
             raise InputError(
-                f"the Sun's place needs {key}, which the record of {monument.monument} lacks (expected it "
-                f"there, or as an argument)"
+                f"the direction of the Sun or a star needs {key}, which the record of {name} lacks (expected there, or "
+                "as an argument)"
             )
-    height = monument.elevation_m or 0.0
-    latitude, longitude = float(angles["latitude_deg"]) * DEGREE, float(angles["longitude_deg"]) * DEGREE
+    height = _first(getattr(monument, "elevation_m", None), getattr(located, "elevation_of_z0_m", None)) or 0.0
+    latitude, longitude = float(angles["latitude_deg"] or 0.0) * DEGREE, float(angles["longitude_deg"] or 0.0) * DEGREE
     return FramePlace(latitude, longitude, height, standard_pressure_hpa(height))
+
+
+def _first(*values: float | None) -> float | None:
+    """First value that is known."""
+    return next((value for value in values if value is not None), None)
 
 
 def sightings(

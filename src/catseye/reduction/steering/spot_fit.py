@@ -79,6 +79,7 @@ class Spot:
     readings          number used
     looked_at         (n, 2) counts in order, of the whole search
     seen              (n,) V there
+    joint             (6, 6) covariance of azimuth and elevation counts, radius rad, amplitude V, background V, flatness
     """
 
     status: str
@@ -92,6 +93,7 @@ class Spot:
     readings: int = 0
     looked_at: Array = field(default_factory=lambda: np.zeros((0, 2)))
     seen: Array = field(default_factory=lambda: np.zeros(0))
+    joint: Array = field(default_factory=lambda: np.full((6, 6), np.nan))
 
     @property
     def found(self) -> bool:
@@ -139,7 +141,7 @@ def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
     middle = n[int(np.argmax(a))]
     xy = offsets_of_counts(middle, head.zeros, n) / head.radius
     size = count_size(middle, head.zeros) / head.radius * head.u_counts
-    sheet = _SpotModel(xy, a, clipped, head, size)
+    sheet = SpotModel(xy, a, clipped, head, size)
     p, q, factor = sheet.fitted()
     if not np.isfinite(p).all() or not np.isfinite(q).all():
         return Spot(
@@ -150,6 +152,8 @@ def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
         edge = counts_of_offsets(middle, head.zeros, p[None, :2] * head.radius)[0]
         return Spot(f"not found: the spot's centre {edge[0]:.1f}, {edge[1]:.1f} lies outside the scan")
     centre, slope = _in_counts(middle, head, p[:2])
+    by_fit = shape_slopes(p, head.radius)
+    by_fit[:2, :2] = slope
     return Spot(
         status=FOUND,
         counts=centre,
@@ -160,14 +164,31 @@ def fit_spot(counts: ArrayLike, amplitude: ArrayLike, head: SearchHead) -> Spot:
         flatness=float(1.0 + p[5] ** 2),
         variance_factor=factor,
         readings=len(a),
+        joint=by_fit @ q @ by_fit.T,
     )
 
 
+def shape_slopes(p: Array, radius: float) -> Array:
+    """Derivatives (6, 6) of x, y, radius, peak, background and flatness by the parameters of `SpotModel`.
+
+    p        parameters of the fit
+    radius   rad, its unit of length; the places stay in that unit
+    """
+    return np.diag([1.0, 1.0, float(np.exp(p[2])) * radius, 1.0, 1.0, 2.0 * float(p[5])])
+
+
 @dataclass(frozen=True, eq=False)
-class _SpotModel:
+class SpotModel:
     """Readings in units of the expected radius, and their fit.
 
     Parameters x, y, ln radius, peak, background, g; flatness is 1 + g^2.
+
+    xy        (n, 2) places
+    a         (n,) V
+    clipped   (n,) bool
+    head      ranger
+    size      (2,) standard uncertainty of a place, of each axis
+    free      (6,) bool: parameters to fit; the others stay where they start: y, along the line of a scan of one axis
     """
 
     xy: Array
@@ -175,6 +196,7 @@ class _SpotModel:
     clipped: NDArray[np.bool_]
     head: SearchHead
     size: Array
+    free: NDArray[np.bool_] = field(default_factory=lambda: np.ones(6, dtype=bool))
 
     @cached_property
     def around(self) -> tuple[Array, Array]:
@@ -228,37 +250,48 @@ class _SpotModel:
     def start(self) -> Array:
         low, high = float(np.min(self.a)), float(np.max(self.a))
         weight = np.maximum(self.a - 0.5 * (low + high), 0.0)
-        centre = weight @ self.xy / weight.sum() if weight.sum() > 0.0 else np.zeros(2)
+        centre = np.where(self.free[:2], weight @ self.xy / weight.sum() if weight.sum() > 0.0 else 0.0, 0.0)
         return np.array([*centre, 0.0, max(high - low, self.head.noise_volt), low, 0.7])
 
     def fitted(self) -> tuple[Array, Array, float]:
-        """Parameters, their covariance, and the variance factor."""
+        """Parameters, their covariance (6, 6), zero for fixed ones, and the variance factor."""
         from scipy.optimize import least_squares
 
-        p, prior = self.start(), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / FLAT_PRIOR])
+        free = self.free
+        p, prior = self.start(), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / FLAT_PRIOR])[free]
+
+        def whole(x: Array) -> Array:
+            full = p.copy()
+            full[free] = x
+            return full
+
         for _ in range(ROUNDS):
             sigma = self.sigma(p)
 
             def active(x: Array) -> Array:
                 return np.where(self.clipped & (self.residual(x) == 0.0), 0.0, 1.0)
 
+            def slopes(x: Array, s: Array = sigma) -> Array:
+                rows = -self.jacobian(whole(x)) * (active(whole(x)) / s)[:, None]
+                return np.vstack([rows[:, free], prior])
+
             solution = least_squares(
-                lambda x, s=sigma: np.append(self.residual(x) / s, x[5] / FLAT_PRIOR),
-                np.clip(p, -BOUNDS, BOUNDS),
-                bounds=(-BOUNDS, BOUNDS),
-                jac=lambda x, s=sigma: np.vstack([-self.jacobian(x) * (active(x) / s)[:, None], prior]),
-                x_scale=np.array([1.0, 1.0, 0.5, max(p[3], 1e-6), max(p[3], 1e-6), 1.0]),
+                lambda x, s=sigma: np.append(self.residual(whole(x)) / s, x[-1] / FLAT_PRIOR),
+                np.clip(p, -BOUNDS, BOUNDS)[free],
+                bounds=(-BOUNDS[free], BOUNDS[free]),
+                jac=slopes,
+                x_scale=np.array([1.0, 1.0, 0.5, max(p[3], 1e-6), max(p[3], 1e-6), 1.0])[free],
                 max_nfev=60,
                 loss="huber",
                 f_scale=FEW_SIGMAS,
             )
-            p = solution.x
+            p = whole(solution.x)
         on = active(p) > 0.0
         sigma = self.sigma(p)[on]
         v = self.residual(p)[on] / sigma
-        rows = self.jacobian(p)[on] / sigma[:, None]
+        rows = self.jacobian(p)[on][:, free] / sigma[:, None]
         weight = FEW_SIGMAS / np.maximum(np.abs(v), FEW_SIGMAS)
-        dof = int(on.sum()) - len(p) + 1  # the prior counts
+        dof = int(on.sum()) - int(free.sum()) + 1  # the prior counts
         normal = (weight * rows.T) @ rows + np.outer(prior, prior)
         scale = np.sqrt(np.diag(normal))
         if (
@@ -272,7 +305,9 @@ class _SpotModel:
         leverage = np.minimum(np.einsum("ni,ij,nj,n->n", rows, q, rows, weight), 0.9)
         # of the readings that determine the centre, not of the dark ones around: leave-one-out values
         factor = float(np.sum(leverage * (v / (1.0 - leverage)) ** 2 * (1.0 - leverage)) / np.sum(leverage))
-        return p, q * max(factor, 1.0), factor
+        joint = np.zeros((6, 6))
+        joint[np.ix_(free, free)] = q * max(factor, 1.0)
+        return p, joint, factor
 
 
 def _singular(correlations: Array) -> bool:

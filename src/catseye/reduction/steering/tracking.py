@@ -7,8 +7,9 @@ misses                  distances of the beams from their targets in between
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,8 +20,9 @@ from catseye.errors import InputError, ValidityError
 from catseye.geometry.antenna.frames import ELEVATION_AXIS_HEIGHT, REFLECTOR_TO_ELEVATION
 from catseye.geometry.frames.rotation import rx, rz
 from catseye.geometry.mirror.encoder import COUNTS_PER_TURN, HALF_TURN, within
-from catseye.geometry.mirror.pointing import MirrorStation, counts, in_mirror_axes
-from catseye.geometry.mirror.track import CountLine, longest_interval, miss
+from catseye.geometry.mirror.imperfect import Imperfections, imperfect_counts
+from catseye.geometry.mirror.pointing import MirrorStation, counts
+from catseye.geometry.mirror.track import CountLine, miss
 from catseye.geometry.sky.time_tag import PER_SECOND, TimeTag
 
 AZIMUTH_SLEW = 35.2 * DEGREE / 60.0  # rad/s, the GBT's, site facts
@@ -87,19 +89,38 @@ class Drive:
         return angle, np.where(moving, rate, 0.0), np.where(moving, bend, 0.0)
 
 
+class PathAxis(Protocol):
+    """Motion of one axis of the telescope: a `Drive`, or a `sky_path.SkyAxis`."""
+
+    @property
+    def peak(self) -> float:
+        """Largest rate of the axis, rad/s."""
+
+    @property
+    def acceleration(self) -> float:
+        """Largest acceleration, rad/s^2."""
+
+    @property
+    def duration(self) -> float:
+        """Time from begin to end, s."""
+
+    def at(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Angle (...), rad, rate and acceleration at times (...), s."""
+
+
 @dataclass(frozen=True, eq=False)
 class AntennaPath:
     """Path of a rigid telescope on a perfect track.
 
     Azimuth clockwise from north, elevation.
 
-    azimuth, elevation       drives
+    azimuth, elevation       motion of each axis
     elevation_axis_height    m
     reflector_to_elevation   (3,) m
     """
 
-    azimuth: Drive
-    elevation: Drive
+    azimuth: PathAxis
+    elevation: PathAxis
     elevation_axis_height: float = ELEVATION_AXIS_HEIGHT
     reflector_to_elevation: tuple[float, float, float] = REFLECTOR_TO_ELEVATION
 
@@ -139,29 +160,6 @@ class AntennaPath:
             azimuth_bend * swing + azimuth_rate**2 * np.cross(spin, swing) + 2.0 * azimuth_rate * np.cross(spin, v) + a
         )
         return place, azimuth_rate * swing + v, acceleration
-
-    def most_acceleration(self, points: ArrayLike, frame: str) -> Array:
-        """Upper limit (n,), m/s^2, of the acceleration of points fixed in a frame.
-
-        Wherever the drives are.
-
-        points, frame    as for `motion`
-
-        Of rates w and accelerations b of azimuth and elevation, the distance R from the elevation axis and its
-        largest distance from the azimuth axis, r: b_a r + w_a^2 r + 2 w_a w_e R + b_e R + w_e^2 R.
-        """
-        at = np.asarray(points, dtype=float)
-        w_a, b_a = self.azimuth.peak, self.azimuth.acceleration * (self.azimuth.peak > 0.0)
-        if frame == "ground":
-            return np.zeros(at.shape[:-1])
-        if frame == "alidade":
-            return (b_a + w_a**2) * np.hypot(at[..., 0], at[..., 1])
-        if frame not in ("elevation", "reflector"):
-            raise InputError(f"frame {frame!r} is unknown (expected ground, alidade, elevation or reflector)")
-        shifted = at + (np.asarray(self.reflector_to_elevation) if frame == "reflector" else 0.0)
-        arm = np.hypot(shifted[..., 1], shifted[..., 2])
-        w_e, b_e = self.elevation.peak, self.elevation.acceleration * (self.elevation.peak > 0.0)
-        return (b_a + w_a**2) * np.hypot(shifted[..., 0], arm) + (2.0 * w_a * w_e + b_e + w_e**2) * arm
 
     def rotation(self, t: ArrayLike) -> Array:
         """Axes of the reflector in the ground frame (t..., 3, 3), as columns."""
@@ -234,7 +232,8 @@ REASONS = {
     Following.FOLLOWED: "followed",
     Following.BEYOND_STOPS: "leaves the azimuth stops in either pointing (expected a shorter track, or another ranger)",
     Following.TOO_FAST: "exceeds the axes' rate: it passes near the azimuth axis",
-    Following.NOWHERE: "has no direction: it meets the scan point",
+    Following.NOWHERE: "has no direction: it meets the scan point, or no setting of the mirror with its offsets looks "
+    "there",
 }
 
 
@@ -269,6 +268,7 @@ def follow(
     interval: float = BUFFER,
     limits: ArrayLike = (-np.inf, np.inf),
     most_rate: float = np.inf,
+    imperfections: Imperfections | None = None,
 ) -> CountTrack:
     """Counts of every ranger for every target, with status.
 
@@ -281,11 +281,12 @@ def follow(
     interval    s, a whole number of nanoseconds
     limits      azimuth stops (2,) or (r, 2), counts
     most_rate   counts/s, of either axis
+    imperfections   axis offsets, tilts and encoder errors of every mirror; None: ideal mirrors
 
     A pair stays on one turn and in one pointing for the whole track: the direct one where the stops allow it, else the
     prime one. Failure is a status.
 
-    Source: [PARKER04] eqs. 2.12-2.26, 2.45, 2.46.
+    Source: [PARKER04] eqs. 2.12-2.26, 2.45, 2.46; with imperfections `geometry.mirror.imperfect`.
     """
     if intervals < 1 or not 0.0 < interval < np.inf:
         raise ValidityError(f"{intervals} intervals of {interval} s are an empty track (expected 1 or more, above 0)")
@@ -294,16 +295,13 @@ def follow(
         raise ValidityError(f"interval {interval!r} s is not a whole number of nanoseconds, as time tags are")
     steps = step * np.arange(intervals + 1)
     since = steps / PER_SECOND
-    station = stations(since)
-    nodes = counts(station, targets(since))
-    nodes[..., 0] = np.unwrap(nodes[..., 0], period=COUNTS_PER_TURN, axis=0)
+    station, points = stations(since), targets(since)
+    nodes, prime_nodes = (_continuous(_exact_counts(station, points, imperfections, prime)) for prime in (False, True))
     low, high = (np.asarray(limits, dtype=float)[..., k] for k in (0, 1))
     if not np.all(low < high):
         raise ValidityError(f"azimuth limits {np.asarray(limits).tolist()} are not in order (expected low < high)")
     low, high = (np.broadcast_to(x, station.shape[1:2])[:, None] for x in (low, high))
     direct, allowed = _on_one_turn(nodes, low, high)
-    zero = np.broadcast_to(station.zeros, (*station.shape, 2))
-    prime_nodes = np.stack([nodes[..., 0] + HALF_TURN, 2.0 * zero[..., 1] - nodes[..., 1]], axis=-1)
     prime, allowed_prime = _on_one_turn(prime_nodes, low, high)
     second = ~allowed & allowed_prime
     chosen = np.where(second[None, :, :, None], prime, direct)
@@ -315,42 +313,14 @@ def follow(
     return CountTrack(begin.plus(steps[:-1]), since, lines, second, status.astype(np.int64))
 
 
-def safe_intervals(
-    stations: MirrorStation,
-    points: ArrayLike,
-    frame: str,
-    *,
-    path: AntennaPath,
-    times: ArrayLike,
-    limit_counts: float = 0.25,
-    limit_angle: float | None = None,
-    longest: float = 10.0,
-) -> Array:
-    """Interval lengths (t, r, n), s, for which the line surely keeps a limit.
-
-    For rangers on the ground.
-
-    stations       (r,), on the ground
-    points         (n, 3), m, fixed in the frame
-    frame, path    of the telescope, as for `fixed`
-    times          (t,) s: beginnings of intervals
-    limit_counts, limit_angle, longest   as for `track.longest_interval`
-
-    The minimum over pairs, as `follow` takes one interval for all, is for the caller: pairs near a mirror's azimuth
-    axis need a short one.
-
-    Source: `track.longest_interval` with the path's own speed and the most of its acceleration.
-    """
-    when = np.asarray(times, dtype=float)
-    place, velocity, _ = path.motion(points, frame, when)
-    sight = in_mirror_axes(stations[None, :, None], place[:, None])
-    speed = np.linalg.norm(velocity, axis=-1)[:, None]
-    most = path.most_acceleration(points, frame)
-    return longest_interval(sight, speed, most, limit_counts=limit_counts, limit_angle=limit_angle, longest=longest)
-
-
 def misses(
-    track: CountTrack, stations: Stations, targets: Targets, *, whole_counts: bool = False, shares: ArrayLike = SHARES
+    track: CountTrack,
+    stations: Stations,
+    targets: Targets,
+    *,
+    whole_counts: bool = False,
+    shares: ArrayLike = SHARES,
+    imperfections: Imperfections | None = None,
 ) -> Array:
     """Distances (s, k, r, p), m, of the beams from their targets.
 
@@ -359,6 +329,7 @@ def misses(
     track, stations, targets   as followed
     whole_counts               round the mirrors to the nearest whole count
     shares                     (k,) 0 to 1 of the interval
+    imperfections              of every mirror; the track may have been followed without them
 
     Source: exact rays, `track.miss`.
     """
@@ -366,8 +337,48 @@ def misses(
     for share in np.asarray(shares, dtype=float):
         t = track.since[:-1] + share * np.diff(track.since)
         counts = track.lines.at(share * track.lines.interval)
-        passed.append(miss(stations(t), np.rint(counts) if whole_counts else counts, targets(t)))
+        passed.append(miss(stations(t), np.rint(counts) if whole_counts else counts, targets(t), imperfections))
     return np.stack(passed, axis=1)
+
+
+def count_errors(
+    track: CountTrack,
+    stations: Stations,
+    targets: Targets,
+    *,
+    shares: ArrayLike = SHARES,
+    imperfections: Imperfections | None = None,
+) -> Array:
+    """Linear counts less exact ones (s, k, r, p, 2), counts, at shares of each interval.
+
+    track, stations, targets   as followed
+    shares                     (k,) 0 to 1 of the interval
+    imperfections              of every mirror, as followed
+
+    Source: [PARKER04] eqs. 2.45 and 2.46 against 2.12 to 2.22 at every instant.
+    """
+    errors = []
+    for share in np.asarray(shares, dtype=float):
+        t = track.since[:-1] + share * np.diff(track.since)
+        exact = _exact_counts(stations(t), targets(t), imperfections, track.prime[None])
+        off = track.lines.at(share * track.lines.interval) - exact
+        off[..., 0] -= COUNTS_PER_TURN * np.rint(off[..., 0] / COUNTS_PER_TURN)
+        errors.append(off)
+    return np.stack(errors, axis=1)
+
+
+def ideal_track(track: CountTrack, stations: Stations, targets: Targets) -> CountTrack:
+    """Track of the same mirrors without imperfections, in the same pointings and on the same turns.
+
+    track, stations, targets   as followed, with imperfections
+
+    Source: [PARKER04] eqs. 2.12-2.26.
+    """
+    nodes = _exact_counts(stations(track.since), targets(track.since), None, track.prime[None])
+    followed = np.concatenate([track.lines.start, track.lines.end[-1:]])
+    turns = np.rint((followed[..., 0] - nodes[..., 0]) / COUNTS_PER_TURN)
+    nodes[..., 0] += COUNTS_PER_TURN * turns
+    return replace(track, lines=replace(track.lines, start=nodes[:-1], end=nodes[1:]))
 
 
 def smear(range_rate: ArrayLike, *, wavelength: float, duration: float = BUFFER) -> tuple[Array, Array]:
@@ -392,6 +403,23 @@ def smear(range_rate: ArrayLike, *, wavelength: float, duration: float = BUFFER)
         raise ValidityError(f"wavelength {wavelength} m, duration {duration} s: expected both above 0 and finite")
     run = -2.0 * TWO_PI * np.asarray(range_rate, dtype=float) * duration / wavelength
     return run, np.abs(np.sinc(0.5 * run / np.pi))
+
+
+def _exact_counts(
+    station: MirrorStation, points: Array, imperfections: Imperfections | None, prime: ArrayLike
+) -> Array:
+    """Counts (..., 2) for points (..., 3), m, in the direct pointing, or in the prime one, half a turn above."""
+    if imperfections is not None:
+        return imperfect_counts(station, imperfections, points, prime=prime)
+    direct = counts(station, points)
+    zero = np.broadcast_to(station.zeros, (*station.shape, 2))
+    second = np.stack([direct[..., 0] + HALF_TURN, 2.0 * zero[..., 1] - direct[..., 1]], axis=-1)
+    return np.where(np.asarray(prime)[..., None], second, direct)
+
+
+def _continuous(nodes: Array) -> Array:
+    """Counts (s, ..., 2) without jumps of a turn of azimuth from time to time."""
+    return np.stack([np.unwrap(nodes[..., 0], period=COUNTS_PER_TURN, axis=0), nodes[..., 1]], axis=-1)
 
 
 def _on_one_turn(nodes: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.bool_]]:

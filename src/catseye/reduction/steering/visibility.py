@@ -24,7 +24,7 @@ from catseye.geometry.antenna.frames import (
 from catseye.geometry.clearance.visibility import first_obstruction, incidence, ranges
 from catseye.geometry.frames.frame import Transform
 from catseye.optics.retroreflector.kinds.kind import RetroreflectorKind
-from catseye.records.night.campaign import Campaign
+from catseye.records.site.folder import SiteFolder
 from catseye.records.site.solids import Solids
 from catseye.reduction.site.places import places_of
 
@@ -206,8 +206,8 @@ def frames_at(azimuth: float, elevation: float, reflector: Transform | None = No
     }
 
 
-def retroreflectors_of(campaign: Campaign) -> Retroreflectors:
-    """Retroreflectors of a campaign, at nominal places.
+def retroreflectors_of(campaign: SiteFolder) -> Retroreflectors:
+    """Retroreflectors of a campaign or a site, at nominal places.
 
     In its posture.
 

@@ -10,6 +10,8 @@ alpha1 about an upright axis, the fixed point moves with dx, dy, dz.
 In units of the priors the covariance falls from 1 to C; the eigenvalues of 1 - C say how much of each combination the
 counts decided: 1 all, 0 nothing. The change from the laboratory's values is normal with the covariance 1 - C where
 both are right; that is tested as a whole (chi-square) and for each parameter.
+
+Source: [PARKER04] section 7.2.3.
 """
 
 from collections.abc import Callable
