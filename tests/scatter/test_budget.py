@@ -32,6 +32,14 @@ HEAD = {
     "cyclic_cosine_mm": (0.05, -0.03),
     "cyclic_sine_mm": (-0.04, 0.02),
     "u_cyclic_mm": 0.02,
+    "second_pass_cosine_per_volt": 4e-4,
+    "second_pass_sine_per_volt": -3e-4,
+    "u_second_pass_per_volt": 2e-4,
+    "u_feedback_rad": 1.5e-3,
+    "detector_radius_mm": 0.1,
+    "detector_lag_rad": 0.02,
+    "image_offset_um": 15.0,
+    "u_image_um": 8.0,
 }
 
 

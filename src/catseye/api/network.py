@@ -12,7 +12,7 @@ from catseye.aliases import Progress
 from catseye.api.network_source import hashes_of, network_of
 from catseye.api.result import Result, quantities
 from catseye.api.units import In, with_units
-from catseye.constants import MILLIMETRE
+from catseye.constants import DEGREE, MILLIMETRE
 from catseye.errors import ArgumentError, EstimationError
 
 if TYPE_CHECKING:
@@ -162,6 +162,10 @@ class AdjustmentResult(Result):
             **{axis: (self.x[:, k], "m") for k, axis in enumerate(axes)},
             **{f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate(axes)},
             "covariance": (self.covariances / MILLIMETRE**2, "mm2"),
+            "u_position": (self.adjusted.u_position / MILLIMETRE, "mm"),
+            "ellipse_major": (self.adjusted.ellipse.major / MILLIMETRE, "mm"),
+            "ellipse_minor": (self.adjusted.ellipse.minor / MILLIMETRE, "mm"),
+            "ellipse_bearing": (self.adjusted.ellipse.bearing / DEGREE, "deg"),
         }
         table = self.adjusted.table
         ends = [*self.names, ""]
@@ -230,6 +234,8 @@ class _AdjustOptions(TypedDict, total=False):
     components: str | None
     scale_by_variance_factor: bool
     level: Any
+    power: Any
+    mdb_level: Any
     iterations: Any
     relative: Sequence[tuple[str, str]]
     sigma_mm: Any
@@ -259,6 +265,8 @@ def adjust(
     components: str | None = None,
     scale_by_variance_factor: bool = False,
     level: Annotated[Any, In("", one=True)] = 0.05,
+    power: Annotated[Any, In("", one=True)] = 0.8,
+    mdb_level: Annotated[Any, In("", one=True)] = 0.001,
     iterations: Annotated[Any, In("", whole=True)] = None,
     relative: Sequence[tuple[str, str]] = (),
     sigma_mm: Annotated[Any, In("mm", one=True)] = None,
@@ -280,6 +288,8 @@ def adjust(
     components   estimate the claims themselves: "rangers" or "groups"
     scale_by_variance_factor   multiply covariances by the variance factor; tau tests
     level        of the tests, of all single ones together
+    power        probability of finding an error of the size of `mdb`, or a displacement of the size of `detectable`
+    mdb_level    level of the test of one observation that `mdb` refers to
     iterations   cap of the Gauss-Newton steps of every solution, 1 or more; None: 50
     relative     pairs of points whose relative ellipsoid is wanted
     sigma_mm, sigma_ppm   standard uncertainty of a range of ranges.csv that has none: a + b D
@@ -306,6 +316,8 @@ def adjust(
         components=components,
         scale_by_variance_factor=scale_by_variance_factor,
         level=level,
+        power=power,
+        mdb_level=mdb_level,
         relative=tuple(relative),
         solver=COMPLETE if iterations is None else replace(COMPLETE, iterations=iterations),
     )
@@ -314,7 +326,13 @@ def adjust(
         return first
     second = _adjusted(later, sigma_mm, sigma_ppm, options=options, progress=progress)
     return compare(
-        first, second, points=points, level=level, scale_by_variance_factor=scale_by_variance_factor, progress=progress
+        first,
+        second,
+        points=points,
+        level=level,
+        power=power,
+        scale_by_variance_factor=scale_by_variance_factor,
+        progress=progress,
     )
 
 
@@ -443,6 +461,7 @@ def compare(
     *,
     points: Sequence[str] | None = None,
     level: Annotated[Any, In("", one=True)] = 0.05,
+    power: Annotated[Any, In("", one=True)] = 0.8,
     scale_by_variance_factor: bool = False,
     progress: Progress | None = None,
 ) -> ComparisonResult:
@@ -451,6 +470,7 @@ def compare(
     first, second   networks as for `adjust`, or what it gave
     points          names to compare; all common ones without
     level           of the tests
+    power           with which they find a displacement of the detectable size
     scale_by_variance_factor   multiply covariances by the variance factor of both epochs together; F tests
 
     Every common point is in the answer, with displacement, covariance and test; one that moved so far that it may be
@@ -471,6 +491,7 @@ def compare(
         epochs[1].adjusted,
         points=points,
         level=level,
+        power=power,
         scale_by_variance_factor=scale_by_variance_factor,
     )
     return ComparisonResult(verdict=found.verdict, compared=found, first=epochs[0], second=epochs[1])

@@ -79,6 +79,7 @@ class PlanResult(Result):
             "point": (self.names, ""),
             **{f"u_{axis}": (self.u[:, k] / MILLIMETRE, "mm") for k, axis in enumerate(axes)},
             "longest_axis": (self.planned.plan.weakest / MILLIMETRE, "mm"),
+            "detectable": (self.planned.detectable / MILLIMETRE, "mm"),
         }
         further = self.planned.plan.candidates
         columns = {

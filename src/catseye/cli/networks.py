@@ -98,6 +98,16 @@ class _Treatment(NamedTuple):
             "--level", callback=_level, help="Significance level of the tests, for all single tests together."
         ),
     ] = 0.05
+    power: Annotated[
+        float,
+        typer.Option(
+            "--power", callback=_level, help="Power of the tests for the detectable errors and displacements."
+        ),
+    ] = 0.8
+    mdb_level: Annotated[
+        float,
+        typer.Option("--mdb-level", callback=_level, help="Level of the single test for the detectable errors (mdb)."),
+    ] = 0.001
     iterations: Annotated[
         int | None,
         typer.Option("--iterations", min=1, help="Cap of the Gauss-Newton steps of every solution; 50 if not given."),

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from catseye.errors import InputError, ValidityError
-from catseye.estimation.ambiguity.search import AmbiguityLimits, AmbiguityStatus, locate, locate_all
+from catseye.estimation.ambiguity.search import AmbiguityLimits, AmbiguityStatus, locate
 from catseye.estimation.ambiguity.tree import Ranged, _next_cycles, _points
 
 HALF = 0.0999
@@ -294,30 +294,3 @@ def test_impossible_searches_have_a_status():
         locate(
             np.zeros(3), np.eye(3), stations, lengths=lengths, period=HALF, covariance=c, station_covariance=np.eye(6)
         )
-
-
-def test_many_points_give_the_single_point_results():
-    rng = np.random.default_rng(20)
-    stations = stations_about(rng, 8)
-    start = rng.uniform(-5.0, 5.0, (9, 3))
-    true = start + 0.1 * rng.standard_normal((9, 3))
-    lengths = np.mod(np.linalg.norm(true[:, None] - stations, axis=2), HALF)
-    seen = rng.random((9, 8)) < 0.8
-    prior = 0.01 * np.eye(3)
-    for c in (np.full((9, 8), 1e-8), 1e-8 * np.eye(8), np.broadcast_to(1e-8 * np.eye(8), (9, 8, 8))):
-        found = locate_all(start, prior, stations, lengths=lengths, period=HALF, covariance=c, seen=seen)
-        for i, one in enumerate(found):
-            mine = seen[i]
-            alone = locate(
-                start[i],
-                prior,
-                stations[mine],
-                lengths=lengths[i, mine],
-                period=HALF,
-                covariance=np.full(mine.sum(), 1e-8),
-            )
-            assert one.status is alone.status
-            np.testing.assert_array_equal(one.cycles, alone.cycles)
-            if one.status is AmbiguityStatus.FOUND:
-                np.testing.assert_allclose(one.x, true[i], rtol=0, atol=1e-6)
-    assert sum(one.status is AmbiguityStatus.FOUND for one in found) >= 6

@@ -8,15 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
 from catseye.estimation.quality.ellipsoid import (
-    PLAN,
     confidence_scale,
     contained_probability,
     elevation_view,
     ellipse,
     ellipsoid,
     horizontal_ellipse,
-    mean_coordinate_uncertainty,
-    outline,
     point_uncertainty,
     projected,
     relative_covariance,
@@ -148,21 +145,6 @@ def test_elevations_show_what_stands_to_the_right_and_up():
     np.testing.assert_allclose(projected(c, elevation_view(np.pi / 2)), np.diag([4.0, 1.0]), atol=1e-14)
 
 
-@quick
-@given(seeds, st.floats(0.0, 6.28))
-def test_an_outline_is_the_edge_of_the_ellipsoid_s_shadow(seed, bearing):
-    c = covariances(seed)
-    for view in (PLAN, elevation_view(bearing)):
-        flat = projected(c, view)
-        edge = outline(flat, scale=2.0, corners=24)
-        assert edge.shape == (25, 2)
-        np.testing.assert_allclose(edge[0], edge[-1], atol=1e-12)
-        shape = np.sum(edge * np.linalg.solve(flat, edge.T).T, axis=1)
-        np.testing.assert_allclose(shape, 4.0, rtol=1e-4)
-        turn = edge[:-1, 0] * edge[1:, 1] - edge[:-1, 1] * edge[1:, 0]
-        assert (turn <= 0.0).all()  # clockwise
-
-
 def test_relative_covariance_is_that_of_the_difference():
     a = np.random.default_rng(0).normal(size=(4, 6, 6))
     joint = a @ np.swapaxes(a, -1, -2)
@@ -176,15 +158,13 @@ def test_point_uncertainty_is_the_root_mean_square_distance_from_the_truth():
     c = covariances(8)
     points = np.random.default_rng(1).multivariate_normal(np.zeros(3), c, size=40_000)
     assert point_uncertainty(c) == pytest.approx(np.sqrt(np.mean(np.sum(points**2, axis=1))), rel=0.02)
-    assert mean_coordinate_uncertainty(c) == pytest.approx(point_uncertainty(c) / np.sqrt(3))
-    assert mean_coordinate_uncertainty(np.eye(2) * 4) == pytest.approx(2.0)
 
 
 def test_the_weakest_direction_of_a_chain_is_its_free_end():
     steps = np.kron(np.tril(np.ones((3, 3))), np.eye(3))  # each point is measured from the one before
     u, motion = weakest_direction(steps @ steps.T)
-    lengths = np.linalg.norm(motion, axis=1)
-    assert motion.shape == (3, 3)
+    assert motion.shape == (9,)
+    lengths = np.linalg.norm(motion.reshape(3, 3), axis=1)
     assert lengths[2] > lengths[1] > lengths[0]
     assert u**2 == pytest.approx(1 / (4 * np.sin(np.pi / 14) ** 2), rel=1e-9)  # of a random walk of three steps
     with pytest.raises(EstimationError, match="leave it out"):

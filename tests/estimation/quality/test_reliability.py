@@ -170,45 +170,12 @@ def test_a_power_below_the_level_is_refused():
 
 
 def test_undetected_error_moves_parameters_by_the_bias_to_noise_ratio():
+    """Exactly: adjusted once with the error and once without, each observation in turn."""
     delta0 = r.noncentrality(0.001, 0.8)
-    sigma = np.full(24, 2.0)
-    q = 4.0 * NETWORK.q
-    bias = r.detectable_bias(sigma, NETWORK.redundancy, delta0)
-    effects = r.effects_of_bias(q, NETWORK.a, sigma**2, bias=bias)
-    length = np.sqrt(np.sum(effects @ np.linalg.inv(q) * effects, axis=1))
+    bias = np.diag(delta0 / np.sqrt(NETWORK.redundancy))
+    effects = np.linalg.lstsq(NETWORK.a, bias, rcond=None)[0].T
+    length = np.sqrt(np.sum(effects @ np.linalg.inv(NETWORK.q) * effects, axis=1))
     np.testing.assert_allclose(length, r.bias_to_noise(NETWORK.redundancy, delta0), rtol=1e-9)
-    np.testing.assert_allclose(r.effects_of_bias(q, NETWORK.a, np.diag(sigma**2), bias=bias), effects, rtol=1e-9)
-    # exact: adjust once with the error, once without
-    observed = np.zeros(24)
-    observed[5] = bias[5]
-    np.testing.assert_allclose(np.linalg.lstsq(NETWORK.a, observed, rcond=None)[0], effects[5], rtol=1e-9)
-    row, size = r.worst_effects(effects)
-    assert size[1] == pytest.approx(np.linalg.norm(effects[row[1], 3:6]))
-    assert size[1] == pytest.approx(np.linalg.norm(effects[:, 3:6], axis=1).max())
-
-
-def test_effects_with_correlated_observations_are_those_of_a_second_adjustment():
-    rng = np.random.default_rng(2)
-    root = rng.normal(size=(24, 24))
-    c = root @ root.T + np.eye(24)
-    p = np.linalg.inv(c)
-    q = np.linalg.inv(NETWORK.a.T @ p @ NETWORK.a)
-    effects = r.effects_of_bias(q, NETWORK.a, c, bias=np.full(24, 3.0))
-    np.testing.assert_allclose(effects[7], q @ NETWORK.a.T @ p @ (3.0 * np.eye(24)[7]), rtol=1e-9)
-
-
-def test_unchecked_observation_hides_errors_only_in_affected_parameters():
-    a = np.zeros((4, 4))
-    a[:3, :3] = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    a[3, :3] = [1, 1, 0]
-    q = np.linalg.inv(a[:, :3].T @ a[:, :3])
-    redundancy = 1 - np.sum(a[:, :3] @ q * a[:, :3], axis=1)
-    assert redundancy[2] == 0.0
-    bias = r.detectable_bias(np.ones(4), redundancy, 4.0)
-    effects = r.effects_of_bias(q, a[:, :3], np.ones(4), bias=bias)
-    assert np.isinf(effects[2, 2])
-    assert effects[2, 0] == effects[2, 1] == 0.0
-    assert np.isfinite(effects[[0, 1, 3]]).all()
 
 
 # --- the whole
@@ -279,12 +246,12 @@ def test_an_error_of_the_detectable_size_is_found_with_the_power_claimed(row):
     rng = np.random.default_rng(row)
     for level, power in ((0.001, 0.8), (0.01, 0.5)):
         errors = rng.normal(size=(4000, 24))
-        errors[:, row] += r.detectable_bias(1.0, NETWORK.redundancy[row], r.noncentrality(level, power))
+        errors[:, row] += r.noncentrality(level, power) / np.sqrt(NETWORK.redundancy[row])
         w, _ = NETWORK.tests(errors)
         assert np.mean(r.w_probability(w[:, row]) < level) == pytest.approx(power, abs=0.03)
         errors = rng.normal(size=(4000, 24))
         delta = r.noncentrality(level, power, NETWORK.degrees)
-        errors[:, row] += r.detectable_bias(1.0, NETWORK.redundancy[row], delta)
+        errors[:, row] += delta / np.sqrt(NETWORK.redundancy[row])
         w, pvv = NETWORK.tests(7.0 * errors)  # the tau test does not know sigma
         tau = w[:, row] / np.sqrt(pvv / NETWORK.degrees)
         assert np.mean(r.tau_probability(tau, NETWORK.degrees) < level) == pytest.approx(power, abs=0.03)
@@ -298,31 +265,34 @@ def test_the_share_of_false_alarms_among_alarms_stays_below_the_level():
     assert np.mean(shares) == pytest.approx(0.1 * 54 / 60, abs=0.01)  # exact for independent tests
 
 
-# --- the list of suspects
+# --- the observations of an adjustment
 
 
-def test_suspects_are_listed_worst_first_with_their_sizes():
+def rejected(tests):
+    return [np.flatnonzero(outcome == r.SUSPECT).tolist() for outcome in tests.outcome]
+
+
+def test_a_suspect_has_its_statistic_and_a_p_value_for_all_tests_together():
     errors = np.random.default_rng(3).normal(size=24) * 0.3
     errors[[4, 19]] += [30.0, -12.0]
     fit = NETWORK.fit(errors)
-    found = r.suspects([NETWORK.fit(np.random.default_rng(5).normal(size=24) * 0.3), fit])
-    assert found[0].group == 1
-    assert found[0].row == 4
-    assert found[0].estimated_error == pytest.approx(30.0, abs=6.0)
-    assert found[0].statistic == fit.standardised[4]
-    assert found[0].p == pytest.approx(2 * stats.norm.sf(abs(fit.standardised[4])))
-    assert found[0].adjusted == pytest.approx(1 - (1 - found[0].p) ** 48, rel=1e-6, abs=1e-15)
-    assert [abs(s.statistic) for s in found] == sorted((abs(s.statistic) for s in found), reverse=True)
+    tests = r.observation_tests([NETWORK.fit(np.random.default_rng(5).normal(size=24) * 0.3), fit])
+    assert rejected(tests)[0] == []
+    assert 4 in rejected(tests)[1]
+    assert np.nanargmin(tests.p[1]) == 4
+    assert tests.statistic[1][4] == fit.standardised[4]
+    assert tests.p[1][4] == pytest.approx(2 * stats.norm.sf(abs(fit.standardised[4])))
+    assert tests.adjusted[1][4] == pytest.approx(1 - (1 - tests.p[1][4]) ** 48, rel=1e-6, abs=1e-15)
 
 
 def test_tau_finds_the_suspect_where_all_sigmas_are_claimed_a_hundred_times_too_small():
     errors = 100.0 * np.random.default_rng(3).normal(size=24)
     errors[4] += 1500.0
     fit = NETWORK.fit(errors)
-    assert len(r.suspects([fit])) > 15  # w trusts the claim
-    found = r.suspects([fit], known_sigma=False)
-    assert [s.row for s in found] == [4]
-    assert found[0].statistic == pytest.approx(fit.standardised[4] / np.sqrt(fit.pvv / NETWORK.degrees))
+    assert len(rejected(r.observation_tests([fit]))[0]) > 15  # w trusts the claim
+    tests = r.observation_tests([fit], known_sigma=False)
+    assert rejected(tests) == [[4]]
+    assert tests.statistic[0][4] == pytest.approx(fit.standardised[4] / np.sqrt(fit.pvv / NETWORK.degrees))
 
 
 def test_the_unchecked_and_those_left_out_are_named_never_accepted():
@@ -340,7 +310,6 @@ def test_the_unchecked_and_those_left_out_are_named_never_accepted():
     assert (tests.outcome[0][:5] == r.ACCEPTED).all()
     assert np.isnan(tests.statistic[0][6:]).all()
     assert np.isnan(tests.adjusted[0][6:]).all()
-    assert [s.row for s in r.suspects([fit])] == [5]
     assert r.checked(fit).tolist() == [True] * 6 + [False, True]
 
 
@@ -352,4 +321,3 @@ def test_an_adjustment_without_any_check_has_no_suspects_and_nothing_accepted():
     tests = r.observation_tests([fit])
     assert tests.tests == 0
     assert (tests.outcome[0] == r.NOT_CHECKED).all()
-    assert r.suspects([fit]) == []

@@ -12,7 +12,6 @@ from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.quality.variance_components import (
     GroupFactors,
     RowModel,
-    constant_and_scale,
     variance_components,
 )
 from draws import draws, same_sigmas
@@ -76,6 +75,17 @@ class Dense:
         """-2 log L of the residuals, without constants."""
         normal = self.whole.T @ np.linalg.solve(c, self.whole)
         return np.linalg.slogdet(c)[1] + np.linalg.slogdet(normal)[1] + observed @ self.projector(c) @ observed
+
+
+def constant_and_scale(names, distances, sigmas, *, start):
+    """Model sigma^2 = a^2 + (b D)^2 of each ranger."""
+    return RowModel(
+        names=tuple(f"{what}^2 of {name}" for name in names for what in ("constant", "scale")),
+        sigmas=tuple(sigmas),
+        cofactors=tuple(np.stack([np.ones(len(d)), d**2], axis=1) for d in distances),
+        columns=tuple(np.array([2 * i, 2 * i + 1]) for i in range(len(names))),
+        start=np.tile(np.square(start), len(names)),
+    )
 
 
 def rangers(seed, m=40, count=2, a=5e-5, b=1e-6):

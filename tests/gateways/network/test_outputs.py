@@ -621,6 +621,7 @@ def test_files_of_two_epochs_are_in_one_directory(compared, tmp_path):
 
 def test_every_column_of_the_coordinates_has_the_unit_of_its_name(found):
     network = found.network
+    plan_axes = np.linalg.eigvalsh(found.solution.covariance[:, :2, :2] * found.factor) ** 0.5
     told = {
         "point": lambda i: found.names[i],
         **{f"{'xyz'[a]}_m": lambda i, a=a: found.x[i, a] for a in range(3)},
@@ -631,6 +632,10 @@ def test_every_column_of_the_coordinates_has_the_unit_of_its_name(found):
             for b in range(a, 3)
         },
         **{f"semi_axis_{k + 1}_mm": lambda i, k=k: found.ellipsoid.semi_axes[i, k] for k in range(3)},
+        "u_position_mm": lambda i: np.linalg.norm(found.u[i]),
+        "ellipse_major_mm": lambda i: plan_axes[i, 1],
+        "ellipse_minor_mm": lambda i: plan_axes[i, 0],
+        "ellipse_bearing_deg": lambda i: found.ellipse.bearing[i],
         "fixed": lambda i: "x y z" if network.points.fixed[i].all() else "",
         "datum": lambda i: "",
         "observations": lambda i: found.observation_counts[i],

@@ -104,7 +104,8 @@ BAD_POINTS = {
         "points.csv: line 1, column 'x' occurs 2 times (expected the header point,x,y,z, optionally role,u_x,u_y,u_z)",
     ),
 }
-HEADER = "(expected the header from,to,distance, optionally sigma)"
+AIR = "temperature_c,pressure_hpa,humidity_percent,group_index,index"
+HEADER = f"(expected the header from,to,distance, optionally sigma,{AIR})"
 BAD_RANGES = {
     "S2,T1": (
         "S2,TT1",
@@ -180,9 +181,18 @@ def test_every_number_written_is_the_number_read(rows, quoted):
 
 
 def test_examples_are_read_and_fit_their_claims(solve):
-    files = {"feed-arm.toml", "ground-ring", "template", "total-station.gkf", "total-station.dat"}
+    files = {
+        "bodies.toml",
+        "displayed",
+        "feed-arm.toml",
+        "ground-ring",
+        "template",
+        "weather.toml",
+        "total-station.gkf",
+        "total-station.dat",
+    }
     assert {path.name for path in EXAMPLES.iterdir()} == files
-    for file in files - {"template"}:  # which has points without a place
+    for file in files - {"template", "displayed"}:  # which have points without a place
         answer = solve(read_network(EXAMPLES / file))
         # noise as claimed: [pvv] / f is 1 within five of its standard deviations
         assert abs(answer.pvv / answer.degrees - 1.0) < 5.0 * (2.0 / answer.degrees) ** 0.5, file

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.errors import EstimationError, InputError
 from catseye.estimation.least_squares.adjustment import adjust
-from catseye.estimation.quality.propagation import agrees, numerical_sensitivity
+from catseye.estimation.quality.propagation import agrees
 from catseye.optics.retroreflector.prism import oblique_change
 from catseye.records.night.campaign import REFERENCE
 from catseye.records.night.path_temperature import PathTemperatureTable
@@ -27,6 +27,15 @@ from catseye.signal.detection.cycle_scatter import _turned
 from few_scene import with_few_targets
 
 PRISM, BALL, HOLLOW, GROUND = 3, 700, 2, 700  # shots of night-01; 2 is between two feed-arm rangers
+
+
+def numerical_sensitivity(model, inputs):
+    """Derivatives by central differences of one and half a standard uncertainty, extrapolated (JCGM 100, 5.1.3)."""
+    x = np.array([i.value for i in inputs])
+    step = np.array([i.u or 1e-6 * abs(i.value) or 1e-9 for i in inputs])
+    offsets = np.concatenate([scale * np.diag(step) for scale in (1.0, -1.0, 0.5, -0.5)])
+    high, low, half_high, half_low = model(x + offsets).reshape(4, len(x))
+    return (4.0 * (half_high - half_low) / step - 0.5 * (high - low) / step) / 3.0
 
 
 def changed(campaign, ranger, **values):
@@ -103,6 +112,14 @@ def planted(night_01):
         cyclic_cosine_mm=(0.03, -0.01),
         cyclic_sine_mm=(-0.02, 0.015),
         u_cyclic_mm=0.004,
+        second_pass_cosine_per_volt=4e-4,
+        second_pass_sine_per_volt=-3e-4,
+        u_second_pass_per_volt=1e-4,
+        u_feedback_rad=1.5e-3,
+        detector_radius_mm=0.1,
+        detector_lag_rad=0.02,
+        image_offset_um=15.0,
+        u_image_um=8.0,
     )
 
 
@@ -180,6 +197,8 @@ def leakage_change(ranger, unit):
         ("leakage real", leakage_change("ZY104", 1.0), 1e-3, 1),
         ("leakage imaginary", leakage_change("ZY104", 1.0j), 1e-3, 1),
         ("coupling", mirror_change("ZY104", "amplitude_to_phase_rad"), 2e-3, 1),
+        ("second pass cosine", mirror_change("ZY104", "second_pass_cosine_per_volt"), 1e-4, 1),
+        ("second pass sine", mirror_change("ZY104", "second_pass_sine_per_volt"), 1e-4, 1),
         ("axes axis offset", mirror_change("ZY104", "axis_offset_mm"), 0.05, 1),
         ("axes mirror offset", mirror_change("ZY104", "mirror_offset_mm"), 0.05, 1),
         ("cyclic cosine 1", cyclic_change("ZY104", "cosine", 1), 0.02, 1),
@@ -484,7 +503,10 @@ def test_effects_missing_in_the_sheet_are_named(night_01, reduced_night_01):
     assert note.startswith("not in this budget")
     assert "cyclic terms" in note
     sheet = night_01.mirror_of("ZY116")
-    said = sheet.model_copy(update={"u_cyclic_mm": 0.01, "u_amplitude_to_phase_rad": 0.001})
+    keys = {"u_cyclic_mm": 0.01, "u_amplitude_to_phase_rad": 0.001, "u_second_pass_per_volt": 1e-4}
+    said = sheet.model_copy(
+        update={**keys, "u_feedback_rad": 1e-3, "detector_radius_mm": 0.1, "detector_lag_rad": 0.01, "u_image_um": 5.0}
+    )
     told = dataclasses.replace(night_01, mirrors={**night_01.mirrors, sheet.zp: said})
     told = with_few_targets(told, "DP026")  # that of the shot among them
     assert explain_shot(told, PRISM, draws=0).notes == ()

@@ -12,19 +12,24 @@ from catseye.reduction.budget.network import (
     WALK,
     network_budget,
     point_functions,
-    settled_night,
 )
 from catseye.reduction.epoch.allowance import Allowance
+from catseye.reduction.epoch.coordinates import settled_network
 from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.head import IMAGE, LASER
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.settings import ReductionSettings
 
 ARM = tuple(f"ZY{number}" for number in range(113, 119))
 
 
+def settled_night(reduction):
+    return settled_network(reduction.campaign, reduction.phases, reduction.electronics, settings=reduction.settings)[0]
+
+
 @pytest.fixture(scope="module")
-def settled(few_01):
-    return settled_night(few_01)
+def settled(reduced_few_01):
+    return settled_night(reduced_few_01)
 
 
 def mean_of(points):
@@ -69,7 +74,7 @@ def test_thermometers_off_by_their_u_move_the_arm_by_their_part(few_01, settled,
 
 def test_the_states_of_a_large_night_have_the_sources_of_a_small_one(few_01, settled):
     """The walk of the electronics as parameters, not as a covariance: the same parts but for weak modes."""
-    large = settled_night(few_01, ReductionSettings(dense_shots=0))
+    large = settled_night(reduce_epoch(few_01, ReductionSettings(dense_shots=0)))
     assert large.network.states
     budgets = [network_budget(s, point_functions(s.network, ARM, mean_of(ARM))) for s in (settled, large)]
     assert set(budgets[0].sources) == set(budgets[1].sources)
@@ -84,4 +89,18 @@ def test_an_allowance_for_a_wrong_thermometer_is_a_source(settled):
     lenient = settled._replace(network=dataclasses.replace(settled.network, allowance=allowance))
     budget = network_budget(lenient, point_functions(lenient.network, ARM, mean_of(ARM)))
     assert budget.share[budget.sources.index(ALLOWANCE), 2] > 0.3
+    np.testing.assert_allclose(budget.share.sum(axis=0), 1.0, rtol=1e-3)
+
+
+def test_what_a_head_adds_to_each_shot_has_lines_of_its_own(few_01, settled):
+    """Not the line of the air: fringes of the laser and images on the detector, in the ratio of their variances."""
+    added = {"u_feedback_rad": 0.4e-3, "detector_radius_mm": 0.1, "detector_lag_rad": 0.04, "u_image_um": 10.0}
+    mirrors = {zp: mirror.model_copy(update=added) for zp, mirror in few_01.mirrors.items()}
+    noisy = settled_night(reduce_epoch(dataclasses.replace(few_01, mirrors=mirrors)))
+    budget = network_budget(noisy, point_functions(noisy.network, ARM, mean_of(ARM)))
+    plain = network_budget(settled, point_functions(settled.network, ARM, mean_of(ARM)))
+    assert not {LASER, IMAGE} & set(plain.sources)
+    laser, image, air = (budget.variance[budget.sources.index(name)] for name in (LASER, IMAGE, FLUCTUATION))
+    np.testing.assert_allclose(image / laser, (2 * 0.04 * 0.1**2 / 0.4e-3) ** 2, rtol=1e-6)  # 0.8 and 0.4 mrad
+    np.testing.assert_allclose(air, plain.variance[plain.sources.index(FLUCTUATION)], rtol=0.2)
     np.testing.assert_allclose(budget.share.sum(axis=0), 1.0, rtol=1e-3)

@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import f, norm
 
 from catseye.errors import ArgumentError, EstimationError
 from catseye.estimation.network.adjustment import adjust_network
+from catseye.gateways.network.summary import passages
 from catseye.records.network.any_file import read_network
 from catseye.reduction.network.adjusted import adjusted, adjusted_network
 from catseye.reduction.network.comparison import compared
@@ -126,12 +128,61 @@ def test_a_weight_tells_how_far_each_observation_counts(ring):
         ({"robust": "strange"}, EstimationError, "robust method 'strange' is unknown"),
         ({"components": "strange"}, EstimationError, "expected rangers or groups"),
         ({"level": 0.0}, ArgumentError, "level = 0 is invalid"),
+        ({"power": 1.0}, ArgumentError, "power = 1 .expected probabilities"),
+        ({"power": 0.04, "mdb_level": 0.05}, ArgumentError, "the power above the level"),
         ({"reject": True, "robust": "huber"}, ArgumentError, "either weigh or leave out"),
     ],
 )
 def test_invalid_options_are_refused_before_any_work(options, kind, said):
     with pytest.raises(kind, match=said):
         AdjustmentOptions(**options)
+
+
+def test_detectable_errors_are_those_of_the_level_and_the_power(ring):
+    """An error is found when it moves w by the sum of both quantiles, where one tail counts; its effects follow."""
+    usual, found = adjusted(ring), adjusted(ring, AdjustmentOptions(power=0.95, mdb_level=0.01))
+    shift = norm.isf(0.005) + norm.isf(0.05)
+    assert found.detectability.noncentrality == pytest.approx(shift, rel=1e-3)  # 4.13 stands for 4.1321
+    t = found.table
+    np.testing.assert_allclose(t.mdb * np.sqrt(t.redundancy) / t.u, shift, rtol=1e-3)
+    for name in ("bias_to_noise", "effect"):
+        ratio = getattr(t, name) / getattr(usual.table, name)
+        np.testing.assert_allclose(ratio, shift / (norm.isf(0.0005) + norm.isf(0.2)), rtol=1e-4)
+    row = 7
+    wrong = adjusted(with_error(ring, row, t.mdb[row]))
+    moved = np.linalg.norm(wrong.x - found.x, axis=1)
+    assert moved[t.ends[row, :2]].max() == pytest.approx(t.effect[row], rel=1e-3)
+    shifted = wrong.table.standardised[row] - found.table.standardised[row]
+    assert shifted == pytest.approx(shift, rel=2e-3)
+    assert "(1 %, power 95 %)" in " ".join(p.text for p in passages(found))
+
+
+def test_an_ellipse_in_plan_holds_its_axes_and_its_bearing_in_any_axes_of_the_file(tunnel, ring):
+    for found in (tunnel, adjusted(ring)):
+        plan = found.solution.covariance[:, :2, :2]
+        turn = found.ellipse.bearing[:, None]
+        for along, axis in ((0.0, found.ellipse.major), (0.5 * np.pi, found.ellipse.minor)):
+            unit = np.stack([np.sin(turn + along), np.cos(turn + along)], axis=-1)[:, 0]
+            variance = np.einsum("ni,nij,nj->n", unit, plan, unit)
+            np.testing.assert_allclose(variance, axis**2, rtol=1e-6, atol=1e-20)
+        np.testing.assert_allclose(found.u_position**2, np.nansum(found.u**2, axis=1), rtol=1e-12)
+
+
+def test_a_point_is_within_its_ellipse_as_often_as_is_said(tunnel):
+    assert tunnel.coverage(3) == pytest.approx((0.1987, 2.7955), abs=6e-5)  # chi-square tables
+    scaled = adjusted_network(tunnel.solution, scaled=True)
+    inside, factor = scaled.coverage(2)
+    freedom = tunnel.solution.degrees_of_freedom
+    assert inside == pytest.approx(f.cdf(0.5, 2, freedom))
+    assert f.cdf(factor**2 / 2, 2, freedom) == pytest.approx(0.95)
+
+
+def test_a_network_without_heights_has_its_ellipses_in_plan():
+    plane = adjusted(read_network(NETWORKS / "dimensions" / "plane-datum.gkf"))
+    free = ~plane.network.points.fixed.any(axis=1)
+    assert np.isnan(plane.covariance[:, 2, 2]).all()
+    assert (plane.ellipse.major[free] > 0.0).all()
+    np.testing.assert_allclose(plane.ellipse.major, plane.ellipsoid.semi_axes[:, 0], rtol=1e-9)
 
 
 def test_a_comparison_is_at_most_as_good_as_its_epochs(ring):

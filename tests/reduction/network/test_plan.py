@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from catseye.errors import ArgumentError
+from catseye.estimation.deformation.comparison import compare
 from catseye.estimation.network.plan import MOST_RANGES
 from catseye.estimation.quality.sample_covariance import covariance_test
 from catseye.gateways.network.plan import plan_passages
@@ -125,3 +126,25 @@ def test_ten_runs_of_a_small_network_compile_nothing():
         "assert not {'numba', 'distributed', 'concurrent.futures.process'} & set(sys.modules), sorted(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("name", ["feed-arm.toml", "ground-ring"])
+def test_a_plan_says_which_movements_a_second_epoch_would_show(name):
+    """The comparison of two such epochs has the same sizes; the sum of squares of one is what its test needs."""
+    found = planned(read_network(ROOT / "examples" / "networks" / name))
+    solution = found.predicted.solution
+    between = compare(solution, solution).deformation
+    rows = [solution.index[point] for point in between.names]
+    np.testing.assert_allclose(found.detectable[rows], between.detectable, rtol=1e-6)
+    assert np.isfinite(found.detectable[found.plan.interest]).any()
+    assert (found.detectable > 2.0 * found.plan.weakest)[np.isfinite(found.detectable)].all()  # sqrt(2) u at the least
+
+
+def test_the_weakest_direction_of_a_plan_is_the_largest_eigenvalue_of_its_covariance():
+    found = planned(read_network(FEED_ARM))
+    u, share = found.weakest_motion
+    values, vectors = np.linalg.eigh(found.predicted.solution.block(found.predicted.names))
+    assert u == pytest.approx(values[-1] ** 0.5, rel=1e-9)
+    np.testing.assert_allclose(share, np.linalg.norm(vectors[:, -1].reshape(-1, 3), axis=1), atol=1e-6)
+    assert u >= found.plan.weakest.max()
+    assert np.sum(share**2) == pytest.approx(1.0)

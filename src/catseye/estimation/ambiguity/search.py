@@ -145,56 +145,6 @@ def locate(
     return _judged(ranged, explanations)
 
 
-def locate_all(
-    start: np.ndarray,
-    prior_covariance: np.ndarray,
-    stations: np.ndarray,
-    *,
-    lengths: np.ndarray,
-    period: np.ndarray | float,
-    covariance: np.ndarray,
-    seen: np.ndarray | None = None,
-    limits: AmbiguityLimits = ALL_TRUSTED,
-) -> list[Located]:
-    """Locate many points ranged from the same stations, as `locate`.
-
-    start              (p, 3) m
-    prior_covariance   (p, 3, 3) m^2, or one (3, 3) for all
-    stations           (r, 3) m
-    lengths            (p, r) m
-    period             (p, r), (r,) or one, m
-    covariance         (p, r, r) or (r, r) m^2; or variances (p, r)
-    seen               (p, r) bool, existing ranges; all if None
-    limits             as for `locate`
-
-    A point's cycles are those of its own ranges, in the stations' order.
-
-    Source: as `locate`.
-    """
-    start, stations, lengths = (np.asarray(v, dtype=float) for v in (start, stations, lengths))
-    points, r = lengths.shape
-    prior = np.broadcast_to(np.asarray(prior_covariance, dtype=float), (points, 3, 3))
-    periods = np.broadcast_to(np.asarray(period, dtype=float), (points, r))
-    c = np.asarray(covariance, dtype=float)
-    variances = c.ndim == 2 and c.shape == (points, r) and not (points == r and np.allclose(c, c.T))
-    existing = np.ones((points, r), dtype=bool) if seen is None else np.asarray(seen, dtype=bool)
-    answers = []
-    for i, used in enumerate(existing):
-        point_covariance = c[i][used] if variances else (c[i] if c.ndim == 3 else c)[np.ix_(used, used)]
-        answers.append(
-            locate(
-                start[i],
-                prior[i],
-                stations[used],
-                lengths=lengths[i, used],
-                period=periods[i, used],
-                covariance=point_covariance,
-                limits=limits,
-            )
-        )
-    return answers
-
-
 def _ranged(
     start: np.ndarray,
     prior_covariance: np.ndarray,

@@ -175,21 +175,7 @@ def horizontal_ellipse(covariance: np.ndarray) -> Ellipse:
     >>> round(float(np.degrees(e.bearing)), 9), round(float(e.major), 9), round(float(e.minor), 9)
     (45.0, 2.0, 1.0)
     """
-    return ellipse(projected(covariance, PLAN))
-
-
-def outline(covariance: np.ndarray, *, scale: float = 1.0, corners: int = 72) -> np.ndarray:
-    """Closed polygon (..., corners + 1, 2) of each ellipse, right and up, for drawing.
-
-    covariance   (..., 2, 2)
-
-    It starts at the end of the major axis and runs clockwise.
-    """
-    e = ellipse(covariance)
-    turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)
-    along, across = e.major[..., None] * np.cos(turn), e.minor[..., None] * np.sin(turn)
-    s, c = np.sin(e.bearing)[..., None], np.cos(e.bearing)[..., None]
-    return scale * np.stack([along * s + across * c, along * c - across * s], axis=-1)
+    return ellipse(np.asarray(covariance)[..., :2, :2])  # not projected: an unknown height leaves the plan known
 
 
 def relative_covariance(joint: np.ndarray) -> np.ndarray:
@@ -207,33 +193,29 @@ def relative_covariance(joint: np.ndarray) -> np.ndarray:
 def point_uncertainty(covariance: np.ndarray) -> np.ndarray:
     """Helmert's point error (...), m: root of the trace, the same in every frame.
 
-    covariance   (..., d, d) m^2; in plan give the upper left (..., 2, 2)
+    covariance   (..., d, d) m^2; coordinates that do not exist (nan) add nothing; nan where none exists
 
     Source: [FOERSTNER16] chapter 4, evaluation of the result.
 
     >>> float(point_uncertainty(np.diag([4.0, 4.0, 1.0])))
     3.0
     """
-    return np.sqrt(np.trace(np.asarray(covariance, dtype=float), axis1=-2, axis2=-1))
-
-
-def mean_coordinate_uncertainty(covariance: np.ndarray) -> np.ndarray:
-    """RMS (...) of the coordinates' standard uncertainties, (..., d, d) m^2 to m."""
-    return point_uncertainty(covariance) / np.sqrt(np.shape(covariance)[-1])
+    variance = np.diagonal(np.asarray(covariance, dtype=float), axis1=-2, axis2=-1)
+    return np.where(np.isnan(variance).all(axis=-1), np.nan, np.sqrt(np.nansum(variance, axis=-1)))
 
 
 def weakest_direction(joint: np.ndarray) -> tuple[float, np.ndarray]:
-    """Standard uncertainty, m, of a network's weakest direction, and each point's motion in it.
+    """Standard uncertainty, m, of a network's weakest direction, and that direction.
 
-    joint   (3k, 3k) m^2, joint covariance of k points
+    joint   (k, k) m^2, joint covariance of k coordinates
 
-    Returns the root of the largest eigenvalue and its unit vector (k, 3), largest component positive.
+    Returns the root of the largest eigenvalue and its unit vector (k,), largest component positive.
     Raises EstimationError where the covariance is not finite.
 
     Source: [FOERSTNER16] chapter 2, principal axes of the standard ellipsoid.
 
     >>> u, motion = weakest_direction(np.diag([1.0, 4.0, 1.0, 1.0, 1.0, 1.0]))
-    >>> float(u), motion[0]
+    >>> float(u), motion[:3]
     (2.0, array([0., 1., 0.]))
     """
     from scipy.linalg import eigh
@@ -242,4 +224,4 @@ def weakest_direction(joint: np.ndarray) -> tuple[float, np.ndarray]:
     if not np.isfinite(joint).all():
         raise EstimationError("no weakest direction of a covariance with nan: a point has no solution; leave it out")
     values, vectors = eigh(joint, subset_by_index=[len(joint) - 1, len(joint) - 1])
-    return float(np.sqrt(values[0])), _upright(vectors[:, 0]).reshape(-1, 3)
+    return float(np.sqrt(values[0])), _upright(vectors[:, 0])

@@ -94,7 +94,6 @@ class Scattered:
     low, high         ends of the probabilistically symmetric coverage interval
     shortest          ends of the shortest interval of the same probability
     probability       of both
-    settled           False if an adaptive run reached its limit before its digits were stable
     """
 
     values: np.ndarray
@@ -104,7 +103,6 @@ class Scattered:
     high: float
     shortest: tuple[float, float]
     probability: float
-    settled: bool = True
 
 
 def propagate(
@@ -183,26 +181,6 @@ def effective_degrees_of_freedom(
     return 1.0 / weight if weight > 0.0 else float("inf")
 
 
-def numerical_sensitivity(model: Model, inputs: Sequence[Input]) -> np.ndarray:
-    """Derivatives (k,) of a model by extrapolated central differences.
-
-    The steps are one and half a standard uncertainty.
-
-    Source: [JCGM100] clause 5.1.3 note 2, with Richardson's extrapolation: exact for polynomials of degree 4. An input
-    of u = 0 is stepped by a millionth of its value, or by 1e-9 about zero.
-
-    >>> slopes = numerical_sensitivity(lambda x: x[:, 0] ** 3 * x[:, 1], [Input("a", 2.0, 0.1), Input("b", 1.0, 0.1)])
-    >>> [round(float(s), 9) for s in slopes]
-    [12.0, 8.0]
-    """
-    x = np.array([i.value for i in inputs])
-    step = np.array([i.u or 1e-6 * abs(i.value) or 1e-9 for i in inputs])
-    k = len(x)
-    offsets = np.concatenate([scale * np.diag(step) for scale in (1.0, -1.0, 0.5, -0.5)])
-    high, low, half_high, half_low = model(x + offsets).reshape(4, k)
-    return (4.0 * (half_high - half_low) / step - 0.5 * (high - low) / step) / 3.0
-
-
 def draw_inputs(
     inputs: Sequence[Input], generator: np.random.Generator, draws: int, *, correlation: np.ndarray | None = None
 ) -> np.ndarray:
@@ -250,40 +228,6 @@ def monte_carlo(
     return _summary(np.concatenate([model(draw(generator, size)) for size in sizes]), probability)
 
 
-def adaptive_monte_carlo(
-    model: Model,
-    draw: Draw,
-    *,
-    generator: np.random.Generator,
-    digits: int = 2,
-    probability: float = 0.95,
-    most: int = 5_000_000,
-) -> Scattered:
-    """Distribution of a result, with draws until mean, u and interval ends are stable.
-
-    digits   significant decimal digits of u, 1 or 2; a second digit costs a hundred times the draws
-    most     limit of draws; a run that reaches it has `settled` False
-
-    Source: [JCGM101] clause 7.9, in sets of 10^4 draws: stable when twice the standard deviation of each of the four
-    between sets is below half a unit of the last of the significant digits of u.
-    """
-    size = max(10_000, int(np.ceil(100.0 / (1.0 - probability))))
-    pieces: list[np.ndarray] = []
-    rounds: list[tuple[float, float, float, float]] = []
-    while True:
-        pieces.append(model(draw(generator, size)))
-        batch_summary = _summary(pieces[-1], probability)
-        rounds.append((batch_summary.mean, batch_summary.u, batch_summary.low, batch_summary.high))
-        sets = len(rounds)
-        if sets < 2:
-            continue
-        tolerance = numerical_tolerance(float(np.mean([u for _, u, _, _ in rounds])), digits)
-        spread = np.std(np.array(rounds), axis=0, ddof=1) / np.sqrt(sets)
-        settled = bool(np.all(2.0 * spread < tolerance))
-        if settled or (sets + 1) * size > most:
-            return _summary(np.concatenate(pieces), probability, settled)
-
-
 def numerical_tolerance(u: float, digits: int = 2) -> float:
     """Numerical tolerance: half a unit of the last significant digit of u.
 
@@ -325,7 +269,7 @@ def agreement(budget: Budget, scattered: Scattered, digits: int = 2) -> bool | N
     return agrees(budget, scattered, digits)
 
 
-def _summary(values: np.ndarray, probability: float, settled: bool = True) -> Scattered:
+def _summary(values: np.ndarray, probability: float) -> Scattered:
     """Mean, deviation and intervals of values, reduced by the first one for precision."""
     start = float(values[0])
     reduced = np.sort(values - start)
@@ -342,7 +286,6 @@ def _summary(values: np.ndarray, probability: float, settled: bool = True) -> Sc
         high=start + float(reduced[min(low_index + inside, n - 1)]),
         shortest=(start + float(reduced[best]), start + float(reduced[best + inside])),
         probability=probability,
-        settled=settled,
     )
 
 

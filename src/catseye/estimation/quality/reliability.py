@@ -197,24 +197,6 @@ def noncentrality(level: float, wanted_power: float, degrees_of_freedom: float =
     return 0.5 * (low + high)
 
 
-def detectable_bias(sigma: np.ndarray, redundancy: np.ndarray, delta0: float) -> np.ndarray:
-    """Smallest detectable error (internal reliability), in the observation's unit.
-
-    It is infinite if unchecked.
-
-    sigma        (...) standard uncertainty of the observation
-    redundancy   (...) its redundancy number, independent observations
-    delta0       `noncentrality`
-
-    Source: [BAARDA68]; [FOERSTNER16] chapter 4, detectability.
-
-    >>> detectable_bias(1e-4, np.array([0.25, 0.0]), 4.0)
-    array([0.0008,    inf])
-    """
-    checked = np.asarray(redundancy) >= UNCHECKED
-    return np.where(checked, delta0 * sigma / np.sqrt(np.where(checked, redundancy, 1.0)), np.inf)
-
-
 def bias_to_noise(redundancy: np.ndarray, delta0: float) -> np.ndarray:
     """Bias-to-noise ratio of the largest undetected error (external reliability).
 
@@ -231,38 +213,6 @@ def bias_to_noise(redundancy: np.ndarray, delta0: float) -> np.ndarray:
     r = np.asarray(redundancy, dtype=float)
     checked = r >= UNCHECKED
     return np.where(checked, delta0 * np.sqrt(np.maximum(1.0 - r, 0.0) / np.where(checked, r, 1.0)), np.inf)
-
-
-def effects_of_bias(q: np.ndarray, jacobian: np.ndarray, covariance: np.ndarray, *, bias: np.ndarray) -> np.ndarray:
-    """Effect of an error of each observation on the parameters: rows of (Q A' P) times the error.
-
-    q            (n, n) covariance of the parameters
-    jacobian     (m, n)
-    covariance   of the observations: (m,) variances of independent ones, or (m, m)
-    bias         (m,) errors, such as detectable ones; where infinite (unchecked) the effect is infinite or 0
-
-    Returns (m, n): row i is the signed change of the parameters by bias i.
-
-    Source: [BAARDA68] (external reliability); [FOERSTNER16] chapter 4.
-    """
-    if np.ndim(covariance) == 1:
-        gain = (jacobian / np.asarray(covariance)[:, None]) @ q
-    else:
-        gain = np.linalg.solve(covariance, jacobian @ q)
-    with np.errstate(invalid="ignore"):
-        return np.where(np.abs(gain) > 1e-12 * np.abs(gain).max(initial=0.0), gain * np.asarray(bias)[:, None], 0.0)
-
-
-def worst_effects(effects: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Observation whose undetected error moves each point most, and the movement.
-
-    effects   (m, 3k) of `effects_of_bias`, for the coordinates of k points
-
-    Returns (k,) rows and (k,) lengths, m.
-    """
-    length = np.linalg.norm(effects.reshape(len(effects), -1, 3), axis=2)
-    worst = np.argmax(length, axis=0)
-    return worst, length[worst, np.arange(length.shape[1])]
 
 
 @dataclass(frozen=True)
@@ -332,19 +282,6 @@ class ObservationTests:
     tests: int
 
 
-@dataclass(frozen=True)
-class SuspectObservation:
-    """Rejected observation: group and row, statistic, p-values, estimated and detectable error."""
-
-    group: int
-    row: int
-    statistic: float
-    p: float
-    adjusted: float
-    estimated_error: float
-    detectable_error: float
-
-
 def checked(fit: GroupFit) -> np.ndarray:
     """Mask (m,) of observations checked by the others.
 
@@ -390,29 +327,3 @@ def _filled(where: np.ndarray, values: np.ndarray) -> np.ndarray:
     full = np.full(len(where), np.nan)
     full[where] = values
     return full
-
-
-def suspects(
-    fits: Sequence[GroupFit], *, level: float = 0.05, correction: str = "sidak", known_sigma: bool = True
-) -> list[SuspectObservation]:
-    """Rejected observations, worst first; arguments as `observation_tests`.
-
-    One wrong observation can make its neighbours suspect too; `robustness.snoop` distinguishes them.
-
-    Source: [BAARDA68]; [POPE76].
-    """
-    tests = observation_tests(fits, level=level, correction=correction, known_sigma=known_sigma)
-    rejected = [
-        SuspectObservation(
-            group=i,
-            row=int(k),
-            statistic=float(tests.statistic[i][k]),
-            p=float(tests.p[i][k]),
-            adjusted=float(tests.adjusted[i][k]),
-            estimated_error=float(fit.estimated_error[k]),
-            detectable_error=float(fit.detectable_error[k]),
-        )
-        for i, fit in enumerate(fits)
-        for k in np.flatnonzero(tests.outcome[i] == SUSPECT)
-    ]
-    return sorted(rejected, key=lambda s: (s.p, -abs(s.statistic)))

@@ -144,30 +144,6 @@ class RowModel:
         return observed, expected, bound
 
 
-def constant_and_scale(
-    names: Sequence[str], distances: Sequence[np.ndarray], sigmas: Sequence[np.ndarray], *, start: tuple[float, float]
-) -> RowModel:
-    """Model sigma^2 = a^2 + (b D)^2 of each ranger, with components a^2 in m^2 and b^2.
-
-    names       of the rangers, one per group
-    distances   one (m,) array per group, m
-    sigmas      one (m,) array per group, m: claimed by the engine and scaled
-    start       initial (a, b), m and ratio (1e-6 is 1 ppm), positive
-
-    >>> model = constant_and_scale(["ZY101"], [np.array([60.0, 120.0])], [np.full(2, 1e-4)], start=(5e-5, 1e-6))
-    >>> model.names
-    ('constant^2 of ZY101', 'scale^2 of ZY101')
-    """
-    squares = [np.square(np.asarray(d, dtype=float)) for d in distances]
-    return RowModel(
-        names=tuple(f"{what}^2 of {name}" for name in names for what in ("constant", "scale")),
-        sigmas=tuple(sigmas),
-        cofactors=tuple(np.stack([np.ones(len(d)), d], axis=1) for d in squares),
-        columns=tuple(np.array([2 * i, 2 * i + 1]) for i in range(len(names))),
-        start=np.tile(np.square(start), len(names)),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Components:
     """Estimated variance components.
@@ -216,7 +192,7 @@ def variance_components(
     """Non-negative restricted maximum likelihood estimate of variance components.
 
     solve        the engine, see the top of this file
-    model        `GroupFactors`, `constant_and_scale`, or any `RowModel`
+    model        `GroupFactors`, or a `RowModel`
     iterations   limit
     tolerance    step, in standard uncertainties of each component, that ends the iteration
 

@@ -23,11 +23,11 @@ from catseye.reduction.network.comparison import ComparedEpochs
 
 
 def input_hashes(source: Path) -> dict[str, str]:
-    """SHA-256 of a network's file, or of the tables in its folder, by name.
+    """SHA-256 of a network's file, or of the tables and air.toml in its folder, by name.
 
     source   a file, or a folder with points.csv and ranges.csv
     """
-    files = sorted(source.glob("*.csv")) if source.is_dir() else [source]
+    files = sorted([*source.glob("*.csv"), *source.glob("air.toml")]) if source.is_dir() else [source]
     return {f.name: hashlib.sha256(f.read_bytes()).hexdigest() for f in files}
 
 
@@ -86,7 +86,14 @@ def write_comparison(
 
 
 def _settings(adjusted: AdjustedNetwork) -> dict[str, Any]:
-    return {"level": adjusted.level, "scaled": adjusted.scaled, "test": adjusted.test, "datum": adjusted.solution.datum}
+    return {
+        "level": adjusted.level,
+        "mdb_level": adjusted.detectability.level,
+        "power": adjusted.detectability.power,
+        "scaled": adjusted.scaled,
+        "test": adjusted.test,
+        "datum": adjusted.solution.datum,
+    }
 
 
 def _files(

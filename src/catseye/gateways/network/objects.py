@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY
 from catseye.gateways.writers.objects import plain
-from catseye.reduction.network.adjusted import AdjustedNetwork
+from catseye.reduction.network.adjusted import CONFIDENCE, AdjustedNetwork
 from catseye.reduction.network.observations import MEASURES, ROLES
 from catseye.reduction.network.treatment import Treatment
 
@@ -24,10 +23,10 @@ def network_object(adjusted: AdjustedNetwork) -> dict[str, Any]:
 
     adjusted   network
 
-    Angles run clockwise, azimuths from north, whatever the file's own sense. `mdb` is for the single test at 0.1 % with
-    power 80 %; `test` is w, or tau where `scaled`, and `p` its p-value corrected for the number of tests. `from`, `to`,
-    `third` and `fourth` follow the kind: at, backsight, foresight of an angle. Parameters refer to x east, y north,
-    z up.
+    Angles run clockwise, azimuths from north, whatever the file's own sense. `mdb` is for the single test of the level
+    and power under `critical`; `test` is w, or tau where `scaled`, and `p` its p-value corrected for the number of
+    tests. `from`, `to`, `third` and `fourth` follow the kind: at, backsight, foresight of an angle. Parameters refer to
+    x east, y north, z up, and so does the bearing of an `ellipse`, clockwise from north.
     """
     points = {name: value for low in _starts(len(adjusted.names)) for name, value in _points(adjusted, low)}
     observations = [
@@ -111,7 +110,14 @@ def _head(adjusted: AdjustedNetwork) -> dict[str, Any]:
                 "level": adjusted.level,
                 "level_single": adjusted.level_single,
                 "value": adjusted.critical,
-                "noncentrality": NONCENTRALITY,
+                "noncentrality": adjusted.detectability.noncentrality,
+                "mdb_level": adjusted.detectability.level,
+                "power": adjusted.detectability.power,
+            },
+            "confidence": {
+                "probability": CONFIDENCE,
+                "ellipsoid": _coverage(adjusted, 3),
+                "ellipse": _coverage(adjusted, 2),
             },
             "treatment": None if adjusted.treatment is None else _treatment(adjusted, adjusted.treatment),
             "relative": [
@@ -136,6 +142,11 @@ def _head(adjusted: AdjustedNetwork) -> dict[str, Any]:
             },
         }
     )
+
+
+def _coverage(adjusted: AdjustedNetwork, dimensions: int) -> dict[str, float]:
+    """Probability of a standard region, and the factor that makes it one of CONFIDENCE."""
+    return dict(zip(("standard", "factor"), adjusted.coverage(dimensions), strict=True))
 
 
 def _treatment(adjusted: AdjustedNetwork, treatment: Treatment) -> dict[str, Any]:
@@ -181,14 +192,27 @@ def _points(adjusted: AdjustedNetwork, low: int) -> Iterator[tuple[str, dict[str
         _numbers(adjusted.covariance[part]),
         _numbers(adjusted.ellipsoid.semi_axes[part]),
         _numbers(np.swapaxes(adjusted.ellipsoid.directions[part], 1, 2)),
+        _numbers(np.stack([adjusted.ellipse.major, adjusted.ellipse.minor, adjusted.ellipse.bearing], axis=1)[part]),
+        _numbers(adjusted.u_position[part]),
         fixed,
         datum,
         absent,
         adjusted.observation_counts[part].tolist(),
     )
-    for name, (x, y, z), u, covariance, semi_axes, directions, fixed_axes, chosen, absent_axes, observations in zip(
-        *columns, strict=True
-    ):
+    for (
+        name,
+        (x, y, z),
+        u,
+        covariance,
+        semi_axes,
+        directions,
+        ellipse,
+        u_position,
+        fixed_axes,
+        chosen,
+        absent_axes,
+        observations,
+    ) in zip(*columns, strict=True):
         yield (
             name,
             {
@@ -196,8 +220,10 @@ def _points(adjusted: AdjustedNetwork, low: int) -> Iterator[tuple[str, dict[str
                 "y": y,
                 "z": z,
                 "u": u,
+                "u_position": u_position,
                 "covariance": covariance,
                 "ellipsoid": {"semi_axes": semi_axes, "directions": directions},
+                "ellipse": dict(zip(("major", "minor", "bearing"), ellipse, strict=True)),
                 "fixed": names[fixed_axes].tolist(),
                 "datum": names[chosen].tolist(),
                 "absent": names[absent_axes].tolist(),

@@ -1,7 +1,6 @@
 """Planned network as JSON, CSV and report: predicted quality, weak points, next observations."""
 
-import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
@@ -49,9 +48,18 @@ def plan_object(planned: PlannedNetwork) -> dict[str, Any]:
         "mean_u": plan.mean_u,
         "interest": [name for name, chosen in zip(names, plan.interest, strict=True) if chosen],
         "weakest": [
-            {"point": names[i], "u": plan.weakest[i], "direction": (plan.direction[i] @ axes).tolist()}
+            {
+                "point": names[i],
+                "u": plan.weakest[i],
+                "direction": (plan.direction[i] @ axes).tolist(),
+                "detectable": planned.detectable[i],
+            }
             for i in planned.weakest
         ],
+        "weakest_motion": {
+            "u": planned.weakest_motion[0],
+            "share": dict(zip(names, planned.weakest_motion[1].tolist(), strict=True)),
+        },
         "candidates": [_candidate(c, scheduled=False) for c in plan.candidates],
         "best_next": _candidate(plan.candidates[0], scheduled=False) if plan.candidates else None,
         "schedule": [_candidate(c, scheduled=True) for c in planned.picked],
@@ -83,11 +91,6 @@ def _scatter(scatter: MonteCarloScatter | None) -> dict[str, Any] | None:
     }
 
 
-def plan_json(planned: PlannedNetwork) -> Iterator[str]:
-    """Plan as JSON text on one line."""
-    yield json.dumps(plan_object(planned), allow_nan=False)
-
-
 def plan_passages(planned: PlannedNetwork) -> list[Passage]:
     """Passages on quality, weak points, next observations, and Monte Carlo."""
     plan, predicted = planned.plan, planned.predicted
@@ -105,7 +108,8 @@ def plan_passages(planned: PlannedNetwork) -> list[Passage]:
         for i in planned.weakest[:3]
     ]
     if weak:
-        passages.append(Passage("Weakest", "; ".join(weak) + "."))
+        passages.append(Passage("Weakest", "; ".join(weak) + f". {_motion(planned)}"))
+    passages += _movements(planned)
     table, worth = predicted.table, planned.worth
     needed = np.flatnonzero(np.isinf(worth))
     unchecked = int(np.sum(~table.checked))
@@ -119,7 +123,7 @@ def plan_passages(planned: PlannedNetwork) -> list[Passage]:
         if len(detectable):
             text += (
                 f" An error of {quantity(float(np.median(detectable)), 'm')} in a length would usually be found, "
-                f"in the worst one {quantity(float(detectable.max()), 'm')} (power 80 %, level 0.1 %)."
+                f"in the worst one {quantity(float(detectable.max()), 'm')} ({predicted.detectability.words})."
             )
     passages.append(Passage("The checks", text))
     if plan.candidates:
@@ -148,6 +152,27 @@ def plan_passages(planned: PlannedNetwork) -> list[Passage]:
     if planned.scatter is not None:
         passages.append(Passage("Monte Carlo", scatter_words(planned.scatter)))
     return passages
+
+
+def _motion(planned: PlannedNetwork) -> str:
+    """Weakest direction of the whole network, in words."""
+    u, share = planned.weakest_motion
+    order = np.argsort(-share, kind="stable")[:3]
+    names = ", ".join(planned.predicted.names[i] for i in order)
+    return f"Of all coordinates together the weakest direction has u {quantity(u, 'm')}; {names} move most in it."
+
+
+def _movements(planned: PlannedNetwork) -> list[Passage]:
+    """Passage on the movements that a second epoch would show."""
+    sizes = planned.detectable[planned.plan.interest & np.isfinite(planned.detectable)]
+    if not len(sizes):
+        return []
+    usual, most = quantity(float(np.median(sizes)), "m"), quantity(float(sizes.max()), "m")
+    text = (
+        f"a second epoch like this would show a movement of {usual} of a median point, of the worst of {most}, in the "
+        "weakest direction (level 5 %, power 80 %)."
+    )
+    return [Passage("Movements", text)]
 
 
 def scatter_words(s: MonteCarloScatter) -> str:
@@ -246,6 +271,7 @@ def _weakest(planned: PlannedNetwork) -> ReportTable:
             text("point", "point", [predicted.names[i] for i in rows]),
             uncertainty("u", "longest axis", planned.plan.weakest[rows] / MILLIMETRE, "mm", 4),
             text("towards", "towards", [direction_words(predicted, int(i)) for i in rows]),
+            number("detectable", "detectable movement", planned.detectable[rows] / MILLIMETRE, "mm", 3),
         ),
         "point",
     )

@@ -5,7 +5,7 @@ from datetime import datetime
 
 import numpy as np
 
-from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
 from catseye.gateways.network.report_charts import network_view, redundancy_chart, residual_charts
 from catseye.gateways.network.summary import factor_words, passages, treatment_passages
 from catseye.gateways.writers.report import (
@@ -19,7 +19,7 @@ from catseye.gateways.writers.report import (
     origin_section,
 )
 from catseye.gateways.writers.report_parts import ReportTable, number, pairs, text, uncertainty
-from catseye.reduction.network.adjusted import AdjustedNetwork
+from catseye.reduction.network.adjusted import CONFIDENCE, AdjustedNetwork
 from catseye.reduction.network.words import quantity
 
 MOST_OBSERVATIONS = 10_000  # listed
@@ -42,7 +42,11 @@ def network_report(
     """
     name = adjusted.network.source or "network"
     axes = ", ".join(adjusted.network.axis_names)
-    settings = {"level of the tests": f"{adjusted.level:g}", "variance factor applied": str(adjusted.scaled)}
+    settings = {
+        "level of the tests": f"{adjusted.level:g}",
+        "test of the detectable errors": adjusted.detectability.words,
+        "variance factor applied": str(adjusted.scaled),
+    }
     return ResultReport(
         title=f"{name}: network adjustment",
         subtitle=(
@@ -193,15 +197,28 @@ def _points(adjusted: AdjustedNetwork, file: str) -> ReportSection:
                 uncertainty(f"semi_axis_{k + 1}", f"{word} semi-axis", axis[:, k], "mm")
                 for k, word in enumerate(("longest", "middle", "shortest"))
             ),
+            uncertainty("ellipse_major", "longer semi-axis in plan", adjusted.ellipse.major[rows] / MILLIMETRE, "mm"),
+            uncertainty("ellipse_minor", "shorter semi-axis in plan", adjusted.ellipse.minor[rows] / MILLIMETRE, "mm"),
+            number("ellipse_bearing", "bearing", adjusted.ellipse.bearing[rows] / DEGREE, "°", 1),
             number("observations", "seen", adjusted.observation_counts[rows], digits=0),
         ),
         "point",
     )
     lead = (
-        f"{note}Semi-axes are those of the standard ellipsoid (1σ), “seen” is the number of observations. "
+        f"{note}Semi-axes are those of the standard ellipsoid, which contains the point with a probability of "
+        f"{_coverage(adjusted, 3)}; in plan of the standard ellipse, {_coverage(adjusted, 2)}, whose longer axis has "
+        "the bearing, clockwise from north. “Seen” is the number of observations. "
         f"Covariances are in {file}."
     )
     return ReportSection("points", "Points", [Text(lead), TableBlock("points", table), *_relative(adjusted)])
+
+
+def _coverage(adjusted: AdjustedNetwork, dimensions: int) -> str:
+    """Probability of a standard region, and its enlargement for a usual one, in words."""
+    share, factor = adjusted.coverage(dimensions)
+    if not np.isfinite(share):
+        return "unknown size"
+    return f"{100.0 * share:.1f} % ({100.0 * CONFIDENCE:g} % with {factor:.2f} times the axes)"
 
 
 def _relative(adjusted: AdjustedNetwork) -> list[Block]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.gateways.writers.passage import Passage
+from catseye.names import counted
 from catseye.reduction.network.adjusted import AdjustedNetwork, observation_words, suspects_words
 from catseye.reduction.network.treatment import Treatment
 from catseye.reduction.network.words import NAMED, listed, quantity
@@ -32,6 +33,7 @@ def passages(adjusted: AdjustedNetwork) -> list[Passage]:
     if adjusted.answered:
         passages += [
             Passage("The points", _points(adjusted)),
+            *_velocity(adjusted),
             *_parameters(adjusted),
             Passage("The fit", _observations(adjusted)),
             Passage("The checks", _checks(adjusted)),
@@ -53,6 +55,17 @@ def point_rows(adjusted: AdjustedNetwork) -> list[str]:
         + f"   u {', '.join(f'{v * 1e3:.3f}' for v in u[has])} mm"
         for name, x, u, has in zip(adjusted.names, adjusted.x, adjusted.u, adjusted.coordinates, strict=True)
     ]
+
+
+def _velocity(adjusted: AdjustedNetwork) -> list[Passage]:
+    """Passage on the first velocity corrections; none without them."""
+    velocity = adjusted.table.velocity[np.isfinite(adjusted.table.velocity)] / MILLIMETRE
+    if not len(velocity):
+        return []
+    text = f"First velocity correction of {counted(len(velocity), 'distance')}: "
+    low, high = float(velocity.min()), float(velocity.max())
+    text += f"{low:+.3f} mm" if len(velocity) == 1 else f"{low:+.3f} to {high:+.3f} mm"
+    return [Passage("The air", f"{text}; of each in observations.csv.")]
 
 
 def _parameters(adjusted: AdjustedNetwork) -> list[Passage]:
@@ -210,5 +223,5 @@ def _checks(adjusted: AdjustedNetwork) -> str:
         if (checked := (table.kind == k) & table.checked).any()
     ]
     if mdb:
-        text += f" The smallest error that the test (0.1 %, power 80 %) usually finds: {', '.join(mdb)}."
+        text += f" The smallest error that the test ({adjusted.detectability.words}) usually finds: {', '.join(mdb)}."
     return text

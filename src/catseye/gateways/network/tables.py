@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from catseye.constants import MILLIMETRE
+from catseye.constants import DEGREE, MILLIMETRE
 from catseye.estimation.network.plan import Candidate
 from catseye.gateways.writers.columns import Column, Table, each
 from catseye.reduction.network.adjusted import AdjustedNetwork
@@ -47,6 +47,28 @@ COORDINATES = Table[AdjustedNetwork](
         Column("u_z_mm", "mm", "standard uncertainty of z", lambda f: f.u[:, 2] / MILLIMETRE, ".7f"),
         *(_mm2(row, column) for row in range(3) for column in range(row, 3)),
         *(_semi_axis(k, word) for k, word in enumerate(("longest", "middle", "shortest"))),
+        Column(
+            "u_position_mm",
+            "mm",
+            "point error: root of the sum of the coordinates' variances",
+            lambda f: f.u_position / MILLIMETRE,
+            ".7f",
+        ),
+        Column(
+            "ellipse_major_mm",
+            "mm",
+            "longer semi-axis of the standard ellipse in plan",
+            lambda f: f.ellipse.major / MILLIMETRE,
+            ".7f",
+        ),
+        Column("ellipse_minor_mm", "mm", "its shorter semi-axis", lambda f: f.ellipse.minor / MILLIMETRE, ".7f"),
+        Column(
+            "ellipse_bearing_deg",
+            "deg",
+            "bearing of its longer axis, clockwise from north (y), 0 to 180",
+            lambda f: f.ellipse.bearing / DEGREE,
+            ".4f",
+        ),
         Column("fixed", "", "axes along which it was held", lambda f: _letters(f, f.network.points.fixed)),
         Column("datum", "", "axes along which it defined the datum", lambda f: _letters(f, f.network.points.datum)),
         Column("observations", "", "number of its observations", lambda f: f.observation_counts),
@@ -108,6 +130,12 @@ def _measure(name: str, doc: str, form: str = ".7g") -> Column[ObservationRows]:
     return Column(name, "", doc, lambda o: o.measure(name), form)
 
 
+def _velocity(rows: ObservationRows) -> np.ndarray | None:
+    """First velocity corrections, mm; None where there is none."""
+    velocity = rows.measure("velocity")
+    return velocity / MILLIMETRE if np.isfinite(velocity).any() else None
+
+
 OBSERVATIONS = Table[ObservationRows](
     "observations.csv",
     PAGE,
@@ -128,6 +156,9 @@ OBSERVATIONS = Table[ObservationRows](
             "bias_to_noise", "largest effect of an error of size `mdb` on a result, over its standard uncertainty"
         ),
         _measure("effect", "largest movement of one of its points by an error of size `mdb`, m"),
+        Column(
+            "velocity_mm", "mm", "first velocity correction that was applied, with `[air]` or `index`", _velocity, ".6f"
+        ),
         Column("test", "", "test statistic: w, or Pope's tau", lambda o: o.adjusted.statistic[o.order], ".6g"),
         Column("p", "", "p-value, corrected for the number of tests", lambda o: o.adjusted.p[o.order], ".6g"),
         Column("suspect", "", "`yes` where the test rejects it", lambda o: _yes(o.suspects)),

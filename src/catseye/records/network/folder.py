@@ -1,7 +1,8 @@
 """Folder with points.csv and ranges.csv: rangers, targets, distances, metres.
 
     points.csv   point,x,y,z and optionally role (free, fixed or datum) and u_x,u_y,u_z
-    ranges.csv   from,to,distance and sigma, or a claim for those without
+    ranges.csv   from,to,distance and sigma, or a claim for those without; with weather as displayed, see `folder_air`
+    air.toml     perhaps: the instrument's wavelength and reference index, weather at stations
 
 A target of ranges.csv that points.csv does not list is an unknown point; a station must be listed. A point without
 coordinates has blank ones. A datum point is part of the inner constraints, relative to the
@@ -22,6 +23,8 @@ from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.refusal import shown
 from catseye.records.network.claim import NO_CLAIM, RangeClaim
+from catseye.records.network.folder_air import AIR_COLUMNS, RangesAir, air_of_ranges, read_folder_air
+from catseye.records.network.toml_air import NetworkAir
 
 POINT_COLUMNS = ("point", "x", "y", "z")
 U_COLUMNS = ("u_x", "u_y", "u_z")
@@ -42,8 +45,9 @@ def read_network_folder(path: Path, claim: RangeClaim = NO_CLAIM, *, planned: bo
     folder = Folder(path)
     points = columns_of(folder.text("points.csv"), "points.csv", POINT_COLUMNS, optional=MORE_POINT_COLUMNS)
     required, optional = range_columns(planned)
-    ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", required, optional=optional)
-    return network_of_tables(points, ranges, claim, planned=planned, source=path.name)
+    ranges = columns_of(folder.text("ranges.csv"), "ranges.csv", required, optional=(*optional, *AIR_COLUMNS))
+    air = read_folder_air(folder)
+    return network_of_tables(points, ranges, claim, planned=planned, source=path.name, air=air)
 
 
 def range_columns(planned: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -52,7 +56,13 @@ def range_columns(planned: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def network_of_tables(
-    points: TextColumns, ranges: TextColumns, claim: RangeClaim, *, planned: bool, source: str = ""
+    points: TextColumns,
+    ranges: TextColumns,
+    claim: RangeClaim,
+    *,
+    planned: bool,
+    source: str = "",
+    air: NetworkAir | None = None,
 ) -> ObservationNetwork:
     """Network of the two tables.
 
@@ -60,6 +70,7 @@ def network_of_tables(
     claim            standard uncertainty of a range whose sigma is blank or missing
     planned          distances may be blank or missing, for a plan
     source           name of the network
+    air              of air.toml: distances are as displayed
     """
     names = names_of(points, "point")
     xyz, fixed, datum, priors = _places(points)
@@ -69,7 +80,8 @@ def network_of_tables(
             names[spelled(name)] = len(names)
         xyz, priors = (np.vstack([rows, np.full((len(unlisted), 3), np.nan)]) for rows in (xyz, priors))
         fixed, datum = (np.vstack([rows, np.zeros((len(unlisted), 3), dtype=bool)]) for rows in (fixed, datum))
-    distances, claims = _distances(ranges, names, claim, planned)
+    of_ranges = air_of_ranges(ranges, air)
+    distances, claims = _distances(ranges, names, claim, planned, of_ranges)
     groups: list[ObservationGroup] = [distances]
     ranged = np.zeros((len(names), 1), dtype=bool)
     ranged[[distances.origin // 3, distances.target // 3]] = True
@@ -82,7 +94,7 @@ def network_of_tables(
         places.append(tuple(f"{points.file} {points.place} {points.lines[int(i)]}" for i in row))
     return ObservationNetwork(
         NetworkPoints(tuple(names), xyz, fixed, datum, absent),
-        (),
+        () if of_ranges is None else of_ranges.parameters,
         tuple(groups),
         tuple(places),
         source=source,
@@ -150,10 +162,10 @@ def _unlisted(ranges: TextColumns, names: PointIndex) -> list[str]:
 
 
 def _distances(
-    ranges: TextColumns, names: PointIndex, claim: RangeClaim, planned: bool
+    ranges: TextColumns, names: PointIndex, claim: RangeClaim, planned: bool, air: RangesAir | None
 ) -> tuple[Distances, np.ndarray | None]:
     """Ranges, and a, b, c of their claims; nan for distances not yet measured."""
-    origin, target = (_numbered(ranges, end, names) for end in ("from", "to"))
+    origin, target = (numbered(ranges, end, names) for end in ("from", "to"))
     ranges.check("to", origin != target, "another point than from")
     distance = np.full(len(ranges), np.nan)
     if "distance" in ranges.cells:
@@ -170,15 +182,28 @@ def _distances(
     if "sigma" in ranges.cells:
         ranges.check("sigma", sigma > 0.0, "above 0 m: no measurement is exact")
     claims = np.where(without[:, None], claim.terms, (0.0, 0.0, 1.0))
-    return Distances("slope distance", distance, sigma**2, 3 * origin, 3 * target), claims if without.any() else None
+    scaling = None
+    if air is not None and air.scaling is not None:
+        scaling = np.where(air.scaling >= 0, air.scaling + 3 * len(names), -1)
+    lengths = Distances(
+        "slope distance",
+        distance,
+        sigma**2,
+        origin=3 * origin,
+        target=3 * target,
+        scale=1.0 if air is None else air.scale,
+        scaling=scaling,
+    )
+    return lengths, claims if without.any() else None
 
 
-def _numbered(ranges: TextColumns, end: str, names: PointIndex) -> np.ndarray:
+def numbered(ranges: TextColumns, end: str, names: PointIndex, table: str = "points.csv") -> np.ndarray:
+    """Row (m,) of the point at one end of each range; InputError for a name that is none."""
     cells = ranges.cells[end]
     try:
         return np.array(list(map(names.__getitem__, cells)))
     except KeyError:
         row = next(i for i, name in enumerate(cells) if name not in names)
         close = difflib.get_close_matches(cells[row], names, n=1)
-        hint = f"perhaps {shown(close[0])}" if close else "a point of points.csv"
+        hint = f"perhaps {shown(close[0])}" if close else f"a point of {table}"
         raise ranges.refuse(row, f"{end} = {shown(cells[row])} is not a point (expected {hint})") from None

@@ -45,7 +45,7 @@ ENDS = {  # names of a kind's points in a file; default: from and to
     "level_plane": ("point",),
 }
 ADDING = ("zero",)  # parameters that add to a length
-SCALING = ("scale", "refractivity")  # and those that multiply it
+SCALING = ("scale", "refractivity", "air", "station_air")  # and those that multiply it
 
 
 @dataclass(frozen=True)

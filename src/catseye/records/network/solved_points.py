@@ -40,6 +40,7 @@ class SolvedPoints:
     verdict      of the reduction; None if the file has none
     dish         names of the prisms of its surface, if it has one
     focal_length of that surface, m
+    unchecked    points that an error of one of their lines would move unseen
     """
 
     file: str
@@ -52,6 +53,7 @@ class SolvedPoints:
     verdict: Verdict | None = None
     dish: tuple[str, ...] = ()
     focal_length: float | None = None
+    unchecked: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         where = Path(self.file).name
@@ -119,6 +121,7 @@ def read_solved_points(path: Path | str, *, averaged: bool = True) -> SolvedPoin
         verdict=stored_verdict(name, document),
         dish=dish,
         focal_length=focal_length,
+        unchecked=_unchecked(name, document, names),
     )
 
 
@@ -193,3 +196,11 @@ def _covariance(file: str, rows: Any, size: int, *, averaged: bool) -> np.ndarra
     if np.any(np.diag(q) < 0.0) or np.any(np.abs(q - q.T) > DRAWN * scale + 1e-30):
         raise refusal(file, "covariance is not symmetric or has a negative variance (expected a covariance, m^2)")
     return 0.5 * (q + q.T) if averaged else q
+
+
+def _unchecked(file: str, document: dict[str, Any], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Unchecked points; none in a file written before they were listed."""
+    listed = document.get("unchecked", [])
+    if not isinstance(listed, list) or not all(isinstance(n, str) and n in names for n in listed):
+        raise refusal(file, "unchecked names no point (expected as catseye reduce writes it)")
+    return tuple(listed)

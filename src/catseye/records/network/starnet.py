@@ -18,6 +18,8 @@ and excludes an observation, which the network's description lists. A coordinate
 The network is plane: no curvature, no refraction. `.REFRACTION k` turns both on, with the coefficient k, for the zenith
 angles of the whole file; horizontal angles are at the mark, distances chords between the ends of the heights. A zenith
 angle beyond half a turn is from the second face.
+
+Source: [PARKER04] section 3.2.1 names the format.
 """
 
 from collections.abc import Callable, Sequence

@@ -13,6 +13,7 @@
                        u_mm + u_ppm of the length
     [[observations]]   many: columns and rows, or file; keys beside them apply to all rows
     [[correlated]]     observation = [tables], correlation = matrix of all their values
+    [air] [[weather]]  displayed distances with weather, see `toml_air`
     [[body]] [[shape]] [[frame]] [[tilt]] [[plane]] [[line]] [[sphere]]     see `toml_bodies`
 
 Kinds: slope_distance horizontal_distance fixed_distance distance_difference (from, to, from_2, to_2) direction (with
@@ -36,6 +37,7 @@ from catseye.records.files.refusal import NUMBER, refusal, shown
 from catseye.records.files.toml_fields import ANGLE, DIMENSIONS, LENGTH, RATIO, Fields
 from catseye.records.network.draft import NetworkDraft
 from catseye.records.network.kinds import ANGLES, ENDS, LENGTHS, Row
+from catseye.records.network.toml_air import GIVEN, NetworkAir
 from catseye.records.network.toml_bodies import SECTIONS, Bodies
 
 FORMAT = "catseye-network-1"
@@ -55,6 +57,7 @@ HEIGHTS = ("slope_distance", "zenith_angle", "height_difference", "inclination")
 RANGED = ("slope_distance", "horizontal_distance")  # kinds affected by a ranger's zero and scale
 TOP = (
     *("format", "description", "point", "points", "ranger", "parameter", "observation", "observations", "correlated"),
+    *("air", "weather"),
     *SECTIONS,
 )
 
@@ -79,6 +82,7 @@ class _Reader:
         self.named: dict[str, int] = {}
         self.rangers: dict[str, dict[str, int]] = {}
         self.sets: dict[tuple[str, str], int] = {}
+        self.air: NetworkAir | None = None
 
     def network(self) -> ObservationNetwork:
         for key in TOP:
@@ -92,6 +96,7 @@ class _Reader:
             self.parameter(fields)
         for fields in self.sections("ranger"):
             self.ranger(fields)
+        self._read_air()
         for fields in self.sections("observation", "observations"):
             self.observation(fields)
         for fields in self.sections("correlated"):
@@ -107,6 +112,14 @@ class _Reader:
                 read(bodies, fields)
                 fields.refuse_unused()
         return self.draft.network()
+
+    def _read_air(self) -> None:
+        weather = self.sections("weather")
+        if "air" in self.document.values:
+            table = self.document.take("air", dict, "a table")
+            self.air = NetworkAir(Fields(self.draft.file, "air", table), weather, self.draft)
+        elif weather:
+            raise weather[0].refuse("needs [air] (expected it, with wavelength_um and reference_index)")
 
     def sections(self, single: str, many: str = "") -> list[Fields]:
         """All tables of a section, including compact ones."""
@@ -263,6 +276,8 @@ class _Reader:
         if kind == "level_plane":
             constants["height"] = fields.quantity("height", LENGTH, 0.0)
         parameters = self._parameters(fields, kind, ends)
+        if kind in RANGED:
+            self._weather(fields, ends[0], constants, parameters)
         shifted = heights if any(heights) else ()
         key = fields.keyed("value", units)
         unit = "gon" if key is not None and key[0].endswith("gon") else "deg" if units is ANGLE else ""
@@ -279,6 +294,20 @@ class _Reader:
             unit=unit,
         )
         self.draft.observe(row)
+
+    def _weather(self, fields: Fields, station: str, constants: dict[str, float], parameters: dict[str, int]) -> None:
+        """Index and air's parameters of a distance with weather."""
+        written = [key for key in GIVEN if fields.has(key)]
+        if self.air is None:
+            if written:
+                raise fields.refuse(f"{written[0]} needs [air] (expected it, with wavelength_um and reference_index)")
+            return
+        if "index" in constants:
+            if written:
+                raise fields.refuse(f"has index and {written[0]} (expected one of them)")
+            return
+        constants["index"] = self.air.reading(fields, station)
+        parameters |= self.air.parameters(spelled(station))
 
     def _parameters(self, fields: Fields, kind: str, ends: tuple[str, ...]) -> dict[str, int]:
         """Parameters by role: those of the observation, its ranger, and its set's orientation."""

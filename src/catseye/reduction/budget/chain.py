@@ -19,8 +19,9 @@ from catseye.optics.retroreflector.kinds.kind import GlassForm
 from catseye.optics.retroreflector.prism import range_constant
 from catseye.reduction.budget.inputs import Item, correlation_of, felt
 from catseye.reduction.budget.scene import ShotScene, walk_of
-from catseye.reduction.epoch.head import mounted, only_prime
+from catseye.reduction.epoch.head import image_of, mounted, only_prime
 from catseye.reduction.site.stations import AXES
+from catseye.signal.systematics.multipath import second_pass_turn
 
 NODES = 3  # of the quadrature along the path: exact to degree 5 in height
 
@@ -55,8 +56,10 @@ def measurement(scene: ShotScene, items: tuple[Item, ...]) -> Model:
         v = DrawnInputs(items, x)
         target, phase, level = _phase(scene, v)
         coupled = v("coupling") * np.log(np.abs(target) / level)
-        half = 0.5 * SPEED_OF_LIGHT / v("frequency")
-        length = half * (scene.cycles - (phase - coupled) / TWO_PI) / _index(scene, v)
+        per_radian = 0.5 * SPEED_OF_LIGHT / (v("frequency") * TWO_PI * _index(scene, v))
+        again, _ = second_pass_turn(phase, np.abs(target), v("second pass cosine"), v("second pass sine"))
+        image = float(image_of(scene.mirror).mean)
+        length = per_radian * (TWO_PI * scene.cycles - phase + coupled - again + image)
         cyclic = sum(
             c * np.cos(k * phase) + s * np.sin(k * phase)
             for k, (c, s) in enumerate(zip(v.orders("cosine"), v.orders("sine"), strict=True), start=1)
@@ -105,7 +108,8 @@ def _phase(scene: ShotScene, v: DrawnInputs) -> tuple[np.ndarray, np.ndarray, np
     """
     leakage = v("leakage real") + 1j * v("leakage imaginary") - scene.leakage
     amplitude, direction = abs(scene.phasor), scene.phasor / abs(scene.phasor)
-    noise = direction * (v.off("amplitude") + 1j * amplitude * (v.off("noise") + v.off("steps")))
+    turn = v.off("noise") + v.off("steps") + v.off("feedback") + v.off("image")
+    noise = direction * (v.off("amplitude") + 1j * amplitude * turn)
     target = scene.phasor + noise - leakage
     references = scene.references
     electronics, level = v.off("references") + v.off("walk"), np.zeros(len(v.x))

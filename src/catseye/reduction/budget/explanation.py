@@ -18,6 +18,7 @@ from catseye.reduction.budget.inputs import Item, correlation_of, items_of
 from catseye.reduction.budget.scene import Assumptions, ShotScene, scene_of
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.epoch import Reduction, reduce_epoch
+from catseye.reduction.epoch.head import IMAGE, LASER
 from catseye.reduction.epoch.ranges import Phases, follow_electronics, measure_phases
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
@@ -222,6 +223,9 @@ def _missing_effects(mirror: Mirror, has_mount: bool) -> list[str]:
     effects = {
         "u_amplitude_to_phase_rad": "coupling of amplitude to phase",
         "u_cyclic_mm": "cyclic terms",
+        "u_second_pass_per_volt": "light that the detector sends out again",
+        "u_feedback_rad": LASER,
+        "u_image_um": IMAGE,
         **({"u_axis_mm": "offsets of axes and beam"} if has_mount else {}),
     }
     missing = [effect for key, effect in effects.items() if getattr(mirror, key) is None]
@@ -259,6 +263,8 @@ def _adjusted(coordinates: AdjustedCoordinates, row: int) -> AdjustedShot | None
         return None
     k = int(at[0])
     names = [ranges.ranger[k], ranges.target[k]]
+    if not set(names) <= set(coordinates.points):
+        return None
     a, b = (coordinates.x[coordinates.index(name)] for name in names)
     distance = float(np.linalg.norm(b - a))
     direction = (b - a) / distance

@@ -3,10 +3,11 @@
 With s = half / (2 pi n), metres a radian, l the path length in air of the phase, P the target's phasor, R_j those of
 the references with weights w_j, G = -n_g h cos r + h_rp cos I the glass of a prism with a fixed reference point:
 
-    phase of the target      -S = -(s + c'), c' the slope of the cyclic deviation by the phase
+    phase of the target      -S = -(s + c'), c' the slope of cyclic deviation and second pass by the phase
     phase of the electronics  S
     leakage L                 S Im(dL/P - sum w_j dL/R_j) - s k Re(dL/P - sum v_j |R_j| dL/R_j / sum v_j |R_j|)
     coupling k                s ln(A/A_ref)
+    second pass               -s times the slopes of `second_pass_turn`
     frequency                 -l / f
     index                     -l / n
     height h                  -n_g cos r       (the point h_rp below the face stays where it is; with two indices the
@@ -28,16 +29,29 @@ from catseye.estimation.quality.propagation import STUDENT, Input
 from catseye.optics.retroreflector.kinds.kind import GlassForm
 from catseye.optics.retroreflector.prism import obliquity_slope
 from catseye.reduction.budget.scene import FELT, ShotScene, head_columns
-from catseye.reduction.epoch.head import AXES, head_corrections, head_unknowns
+from catseye.reduction.epoch.head import (
+    AXES,
+    IMAGE,
+    LASER,
+    head_corrections,
+    head_noise,
+    head_unknowns,
+    radian_length,
+)
 from catseye.reduction.epoch.parameter import ParameterKind
 from catseye.signal.detection.buffers import inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES
 from catseye.signal.systematics.cyclic import cyclic_slope
+from catseye.signal.systematics.multipath import second_pass_slopes
 
 NAMED = 0.01  # weight of a reference beyond which it has its own line
 DITHERED = 0.5  # codes of rms noise above which a converter's steps are averaged like noise
 ASSUMED = "assumed: "
 SHEET = "mirrors/{}.toml: "
+NEW_EACH_SHOT = {  # effect -> key of its item, keys of the sheet
+    LASER: ("feedback", "u_feedback_rad"),
+    IMAGE: ("image", "u_image_um, image_offset_um, detector_lag_rad"),
+}
 
 
 @dataclass(frozen=True)
@@ -83,12 +97,19 @@ def correlation_of(scene: ShotScene, items: tuple[Item, ...]) -> np.ndarray:
 def _phase_slope(scene: ShotScene) -> tuple[float, float]:
     """Slopes S and s, m a radian, of the range by the electronics' phase.
 
-    With and without the cyclic deviation.
+    With and without cyclic deviation and second pass.
     """
     s = scene.half / (TWO_PI * scene.index)
     mirror = scene.mirror
     cosine, sine = (np.array(c) * MILLIMETRE for c in (mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm))
-    return s + float(cyclic_slope(scene.phase, cosine, sine)), s
+    return s + float(cyclic_slope(scene.phase, cosine, sine)) + s * float(_second_pass_slopes(scene)[0]), s
+
+
+def _second_pass_slopes(scene: ShotScene) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes of the second pass's turn by phase, rad/rad, and amplitude, rad/V."""
+    mirror = scene.mirror
+    pair = mirror.second_pass_cosine_per_volt, mirror.second_pass_sine_per_volt
+    return second_pass_slopes(scene.phase, abs(scene.phasor), *pair)
 
 
 def _noise(scene: ShotScene, row: int, phasor: complex) -> tuple[str, float]:
@@ -127,12 +148,17 @@ def _samples(scene: ShotScene) -> list[Item]:
     phase = float(np.mod(np.angle(scene.phasor), TWO_PI))
     coupling = scene.mirror.amplitude_to_phase_rad
     return [
+        *(
+            Item(key, Input(effect, 0.0, u), "rad", -slope, SHEET.format(scene.mirror.zp) + source)
+            for effect, u in head_noise(scene.mirror).items()
+            for key, source in (NEW_EACH_SHOT[effect],)
+        ),
         Item("noise", Input("noise of the target", phase, u_noise / amplitude, kind, degrees), "rad", -slope, noise),
         Item(
             "amplitude",
             Input("amplitude of the target", amplitude, scene.u_phasor, kind, degrees),
             "V",
-            s * coupling / amplitude,
+            s * (coupling / amplitude - float(_second_pass_slopes(scene)[1])),
             "as the noise",
         ),
         Item(
@@ -193,6 +219,7 @@ def _head(scene: ShotScene) -> list[Item]:
         turn, level = (unit * (target - cube)).imag, (unit * (target - cube_level)).real
         quantity = Input(f"leakage, {key}", value, mirror.u_leakage_volt)
         by = slope * turn - s * mirror.amplitude_to_phase_rad * level
+        by += s * float(_second_pass_slopes(scene)[1]) * abs(scene.phasor) * (unit * target).real
         items.append(Item(f"leakage {key}", quantity, "V", by, f"{file}u_leakage_volt; in target and references alike"))
     quantity = Input("distance of the cube D0", mirror.d0_mm, mirror.u_d0_mm)
     return [*items, Item("d0", quantity, "mm", MILLIMETRE, f"{file}u_d0_mm"), *_effects(scene, file)]
@@ -210,7 +237,7 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
         phase=np.array([scene.phase]),
         amplitude=np.array([abs(scene.phasor)]),
         reference_amplitude=np.array([scene.references.amplitude]),
-        index=np.array([scene.index]),
+        per_radian=radian_length(np.array([scene.modulation_hz]), np.array([scene.index])),
     )
     slopes = iter(corrections.slopes[0])
     items = []
@@ -221,6 +248,9 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
             values, unit, factor = tuple(getattr(mirror, key) for key in AXES), "mm", MILLIMETRE
         elif kind is ParameterKind.AMPLITUDE:
             values, unit, factor = (mirror.amplitude_to_phase_rad,), "rad", 1.0
+        elif kind is ParameterKind.SECOND_PASS:
+            values = mirror.second_pass_cosine_per_volt, mirror.second_pass_sine_per_volt
+            unit, factor = "1/V", 1.0
         else:
             values, unit, factor = (*mirror.cyclic_cosine_mm, *mirror.cyclic_sine_mm), "mm", MILLIMETRE
         values = values or (0.0,) * len(unknown.parts)
@@ -229,6 +259,7 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
                 ParameterKind.AXES: (f"axes {part}", part),
                 ParameterKind.AMPLITUDE: ("coupling", "amplitude to phase"),
                 ParameterKind.CYCLIC: (f"cyclic {part}", f"cyclic, {part}"),
+                ParameterKind.SECOND_PASS: (f"second pass {part}", f"second pass, {part}"),
             }[kind]
             quantity = Input(name, float(value), unknown.u / factor)
             items.append(Item(key, quantity, unit, float(next(slopes)) * factor, file + unknown.key))
@@ -236,7 +267,7 @@ def _effects(scene: ShotScene, file: str) -> list[Item]:
 
 
 def _frequency(scene: ShotScene) -> list[Item]:
-    f = scene.campaign.site.ranging.modulation_hz
+    f = scene.modulation_hz
     quantity = Input("modulation frequency", f, scene.assumptions.u_frequency * f)
     return [Item("frequency", quantity, "Hz", -scene.length / f, ASSUMED + "a rubidium oscillator left alone")]
 

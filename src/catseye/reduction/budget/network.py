@@ -13,20 +13,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.constants import PPM, TWO_PI
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.estimation.observations.kinds import ObservationGroup
-from catseye.processors import one_thread
-from catseye.records.night.campaign import Campaign
 from catseye.reduction.epoch.common_errors import common_errors, considered, reach_of
-from catseye.reduction.epoch.coordinates import settled_network
-from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
-from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.epoch.head import head_noise
+from catseye.reduction.epoch.prior_names import ELECTRONICS, REPEATS
 from catseye.reduction.epoch.settling import SettledNetwork
 from catseye.reduction.epoch.shots import ShotParts
-from catseye.reduction.epoch.telescope_track import at_middle_posture
-from catseye.reduction.epoch.unknowns import ELECTRONICS, REPEATS, CampaignNetwork
+from catseye.reduction.epoch.unknowns import CampaignNetwork
 
 NOISE, EDDIES, WALK, FLUCTUATION = "noise of the samples", "turbulence", "walk of the electronics", "air of each line"
 STATES = {ELECTRONICS: WALK, REPEATS: FLUCTUATION}  # of a large night: the same errors as parameters with priors
@@ -55,16 +51,6 @@ class NetworkBudget:
     def share(self) -> np.ndarray:
         """Shares (s, k) of the variance."""
         return self.variance / self.total
-
-
-def settled_night(campaign: Campaign, settings: ReductionSettings | None = None) -> SettledNetwork:
-    """Settled adjustment of a campaign, as `reduce_epoch` has it."""
-    settings, campaign = settings or ReductionSettings(), at_middle_posture(campaign)
-    phases = measure_phases(campaign, settings)
-    with one_thread():
-        electronics, _ = follow_electronics(campaign, phases, settings.dense_shots)
-        settled, _ = settled_network(campaign, phases, electronics, settings=settings)
-    return settled
 
 
 def point_functions(network: CampaignNetwork, points: tuple[str, ...], weights: np.ndarray) -> np.ndarray:
@@ -130,18 +116,20 @@ def _gain(
 def _of_shots(network: CampaignNetwork, group: ObservationGroup, part: ShotParts) -> Iterator[tuple[str, np.ndarray]]:
     """Parts of the covariance of one ranger's optical lengths.
 
-    All that is neither noise nor walk is the air of the line.
+    All that is neither noise of samples or head nor walk is the air of the line.
     """
-    per_radian = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz / TWO_PI
+    per_radian = network.campaign.half_wavelengths(part.electronics.shots) / TWO_PI
     noise = (per_radian * network.phases.u_phase[part.electronics.shots]) ** 2
     eddies = (network.strength.eddies_ppm * PPM * part.distance) ** 2
+    sheet = head_noise(network.campaign.mirror_of(part.name))
+    head = {source: np.full(len(noise), (per_radian * u) ** 2) for source, u in sheet.items()}
     if part.name in network.states:
         walk = per_radian**2 * network.states[part.name].own
     else:
-        walk = per_radian**2 * part.electronics.covariance
-    independent = noise + eddies
+        walk = np.outer(per_radian, per_radian) * part.electronics.covariance
+    independent = sum(head.values(), noise + eddies)
     air = group.covariance - (independent + walk if walk.ndim == 1 else np.diag(independent) + walk)
-    yield from ((NOISE, noise), (EDDIES, eddies), (WALK, walk), (FLUCTUATION, air))
+    yield from ((NOISE, noise), *head.items(), (EDDIES, eddies), (WALK, walk), (FLUCTUATION, air))
 
 
 def _quadratic(covariance: np.ndarray, gain: np.ndarray) -> np.ndarray:

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT
+from catseye.constants import MILLIMETRE, SECONDS_PER_DAY
 from catseye.errors import InputError
 from catseye.records.night.campaign import REFERENCE, Campaign
 from catseye.records.site.mirror import Mirror
 from catseye.reduction.epoch.air.field import AirField, PathAir
-from catseye.reduction.epoch.head import head_corrections, head_unknowns
+from catseye.reduction.epoch.head import head_corrections, head_unknowns, radian_length
 from catseye.reduction.epoch.parameter import Parameter
 from catseye.reduction.epoch.ranges import Phases
 from catseye.reduction.epoch.settings import ReductionSettings
@@ -121,7 +121,12 @@ class ShotScene:
 
     @property
     def mirror(self) -> Mirror:
-        return self.campaign.mirror_of(self.ranger)
+        return self.campaign.mirror_of(self.ranger).at_modulation(self.modulation_hz)
+
+    @property
+    def modulation_hz(self) -> float:
+        """Modulation frequency of the shot, Hz."""
+        return float(self.campaign.modulation_of(np.array([self.row]))[0])
 
     @property
     def towards(self) -> np.ndarray:
@@ -183,10 +188,11 @@ def scene_of(
     if cosine <= 0.0:
         raise InputError(f"shot {shots.shot[row]}: the face of {target} looks away from {ranger}: no range")
     incidence, obliquity = (0.0, 0.0) if place.normal is None else _obliquity(campaign, place, cosine)
-    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
+    modulation = campaign.modulation_of(np.array([row]))
+    half = float(campaign.half_wavelengths(np.array([row]))[0])
     phase = float(fraction(phases.phase[row], references.phase))
     index = 1.0 + float(path.refractivity[0])
-    head = _head(campaign, ranger, b - a, phase, abs(phases.phasor[row]), references.amplitude, index)
+    head = _head(campaign, ranger, b - a, phase, abs(phases.phasor[row]), references.amplitude, index, modulation)
     coarse = index * (distance - place.constant - obliquity - mirror.d0_mm * MILLIMETRE - head)
     cycles, margin = whole_cycles(coarse, phase, half)
     return ShotScene(
@@ -234,10 +240,15 @@ def references_of(campaign: Campaign, phases: Phases, wrong: Mapping[int, str], 
     Source: as `follow_electronics`; the weights are those of `drift_at`, which is linear in the phases.
     """
     shots = campaign.shots
+    modulation = campaign.modulation_of(np.arange(len(shots)))
     good = [
         k
         for k, (ranger, target) in enumerate(zip(shots.ranger, shots.target, strict=True))
-        if ranger == shots.ranger[row] and target == REFERENCE and not phases.reason[k] and k not in wrong
+        if ranger == shots.ranger[row]
+        and target == REFERENCE
+        and not phases.reason[k]
+        and k not in wrong
+        and modulation[k] == modulation[row]
     ]
     if not good:
         raise InputError(f"shot {shots.shot[row]}: {shots.ranger[row]} has no usable shot on its internal cube")
@@ -292,6 +303,7 @@ def _head(
     amplitude: float,
     reference_amplitude: float,
     index: float,
+    modulation_hz: np.ndarray,
 ) -> float:
     corrections = head_corrections(
         campaign,
@@ -301,6 +313,6 @@ def _head(
         phase=np.array([phase]),
         amplitude=np.array([amplitude]),
         reference_amplitude=np.array([reference_amplitude]),
-        index=np.array([index]),
+        per_radian=radian_length(modulation_hz, np.array([index])),
     )
     return float(corrections.value[0])

@@ -11,6 +11,7 @@ NEGLIGIBLE = 1e-4  # of u: a smaller contribution changes the sum by 1e-8 at mos
 UNSTATED = "normal (assumed)"  # a sheet's u comes without a distribution
 NORMAL = "normal"
 SCATTER = "Student's t"
+ROUNDING = 1e15  # degrees of freedom beyond which the estimated part is rounding of the other
 
 
 class Contribution(NamedTuple):
@@ -123,7 +124,8 @@ class CovarianceParts:
         by_variance = np.array([float(slope @ part @ slope) for part in self.estimated.values()])
         variance = max(float(by_variance @ self.variances), 0.0)
         spread = 2.0 * float(by_variance @ np.linalg.pinv(self.information) @ by_variance)
-        degrees = 2.0 * variance**2 / spread if spread > 0.0 else np.inf
+        touched = variance**2 > 0.0 and spread > 0.0  # else the square underflows, and nothing is contributed
+        degrees = 2.0 * variance**2 / spread if touched else np.inf
         name = " and ".join(self.estimated)
         rows.append(Contribution(name, float(np.sqrt(variance)), unit, "A", SCATTER, degrees, 1.0))
         return rows
@@ -155,4 +157,5 @@ def welch_satterthwaite(rows: Sequence[Contribution]) -> float:
     """
     total = combined(rows)
     weighed = sum(row.part**4 / row.degrees for row in rows)
-    return float(total**4 / weighed) if weighed > 0.0 else float("inf")
+    degrees = float(total**4 / weighed) if weighed > 0.0 else float("inf")
+    return degrees if degrees < ROUNDING else float("inf")

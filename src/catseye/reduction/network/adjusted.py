@@ -1,4 +1,7 @@
-"""Adjusted network: coordinates, tests of its observations and verdict, in the axes of its own file."""
+"""Adjusted network: coordinates, tests of its observations and verdict, in the axes of its own file.
+
+Source: [PARKER04] sections 3.1.2, 3.2.1 and 3.2.3 (stations and targets from ranges alone).
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +13,16 @@ from catseye.aliases import Progress
 from catseye.errors import EstimationError
 from catseye.estimation.least_squares.status import CONVERGED
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, label
-from catseye.estimation.quality.ellipsoid import Ellipsoid, ellipsoid, relative_covariance
+from catseye.estimation.quality.ellipsoid import (
+    Ellipse,
+    Ellipsoid,
+    confidence_scale,
+    contained_probability,
+    ellipsoid,
+    horizontal_ellipse,
+    point_uncertainty,
+    relative_covariance,
+)
 from catseye.estimation.quality.reliability import (
     TOO_LARGE,
     TOO_SMALL,
@@ -22,11 +34,18 @@ from catseye.estimation.quality.reliability import (
     too_good,
     w_critical,
 )
-from catseye.reduction.network.observations import ObservationTable, in_file_axes, observation_table
+from catseye.reduction.network.observations import (
+    USUAL,
+    Detectability,
+    ObservationTable,
+    in_file_axes,
+    observation_table,
+)
 from catseye.reduction.network.treatment import AdjustmentOptions, Treatment, treated
 from catseye.reduction.network.words import NAMED, listed, quantity
 from catseye.verdict import Verdict
 
+CONFIDENCE = 0.95  # probability of the region beside the standard one
 UNIT = 300.0  # times too large: above the geometric mean of 100 and 1000, mm for m is the likely cause
 STATIONED = ("distance", "direction", "angle", "azimuth")  # words in the names of kinds measured from a station
 
@@ -70,6 +89,7 @@ class AdjustedNetwork:
     relative      between the requested pairs of points
     critical      |statistic| above which an observation is suspect; nan if nothing is tested
     treatment     of its observations; None where nothing treated them, as in a plan
+    detectability   level and power of the table's minimal detectable biases
     """
 
     solution: NetworkSolution
@@ -89,6 +109,7 @@ class AdjustedNetwork:
     critical: float
     relative: tuple[Relative, ...] = ()
     treatment: Treatment | None = None
+    detectability: Detectability = USUAL
 
     @property
     def network(self) -> ObservationNetwork:
@@ -117,6 +138,27 @@ class AdjustedNetwork:
     def u(self) -> np.ndarray:
         """Standard uncertainties of the coordinates, (n, 3) m."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
+
+    @cached_property
+    def u_position(self) -> np.ndarray:
+        """Helmert's point errors, (n,) m: root of the sum of the coordinates' variances."""
+        return point_uncertainty(self.covariance)
+
+    @cached_property
+    def ellipse(self) -> Ellipse:
+        """Standard ellipses (n,) of the points in plan, bearings clockwise from north."""
+        return horizontal_ellipse(self.solution.covariance * self.factor)
+
+    def coverage(self, dimensions: int) -> tuple[float, float]:
+        """Probability that a standard ellipsoid (3) or ellipse (2) contains its point, and the factor for CONFIDENCE.
+
+        nan where a variance factor without redundancy was applied.
+        """
+        degrees = self.solution.degrees_of_freedom if self.scaled else np.inf
+        if not degrees > 0.0:
+            return float("nan"), float("nan")
+        factor = confidence_scale(CONFIDENCE, dimensions, degrees)
+        return contained_probability(1.0, dimensions, degrees), factor
 
     @cached_property
     def coordinates(self) -> np.ndarray:
@@ -198,6 +240,7 @@ def adjusted(
         level=options.level,
         pairs=options.relative,
         treatment=treatment,
+        detectability=options.detectability,
     )
 
 
@@ -208,6 +251,7 @@ def adjusted_network(
     level: float = 0.05,
     pairs: Sequence[tuple[str, str]] = (),
     treatment: Treatment | None = None,
+    detectability: Detectability = USUAL,
 ) -> AdjustedNetwork:
     """Adjusted network with tests and verdict, from its solution.
 
@@ -216,6 +260,7 @@ def adjusted_network(
     level       of the chi-square test, and of all tests of single observations together
     pairs       pairs of points, by name, for relative ellipsoids
     treatment   of the observations
+    detectability   level and power of the minimal detectable biases
 
     Raises EstimationError for a name that is not in the network, and if `scaled` without redundancy.
     """
@@ -226,7 +271,7 @@ def adjusted_network(
             "do not scale the claimed uncertainties"
         )
     x, covariance = in_file_axes(solution.network, solution.x, solution.covariance * factor)
-    table = observation_table(solution)
+    table = observation_table(solution, detectability)
     tau = scaled and solution.degrees_of_freedom > 1.0
     tests = observation_tests(solution.fits, level=level, known_sigma=not tau)
     offset = np.cumsum([0, *(len(f.residual) for f in solution.fits)])
@@ -259,6 +304,7 @@ def adjusted_network(
         critical=limit,
         relative=tuple(_relative(solution, pair, factor) for pair in pairs),
         treatment=treatment,
+        detectability=detectability,
     )
 
 

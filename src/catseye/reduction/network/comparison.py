@@ -103,6 +103,7 @@ def compared(
     *,
     points: Sequence[str] | None = None,
     level: float = 0.05,
+    power: float = 0.8,
     scale_by_variance_factor: bool = False,
 ) -> ComparedEpochs:
     """Two epochs of a network compared.
@@ -110,11 +111,12 @@ def compared(
     first, second   adjustments
     points          names to compare; None: all common ones
     level           of the tests
+    power           with which they find a displacement of the detectable size
     scale_by_variance_factor   multiply covariances by the variance factor of both epochs together; F tests
 
     Raises EstimationError where the two have too little in common.
     """
-    options = ComparisonOptions(level=level, scale_by_variance_factor=scale_by_variance_factor)
+    options = ComparisonOptions(level=level, power=power, scale_by_variance_factor=scale_by_variance_factor)
     return ComparedEpochs(first, second, compare(first.solution, second.solution, points=points, options=options))
 
 

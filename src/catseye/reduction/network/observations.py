@@ -7,10 +7,11 @@ from operator import itemgetter
 
 import numpy as np
 
+from catseye.errors import ArgumentError
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY
 from catseye.estimation.network.external import effects_at_ends
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork, points_of
-from catseye.estimation.quality.reliability import bias_to_noise, checked
+from catseye.estimation.quality.reliability import bias_to_noise, checked, noncentrality
 
 ROLES = ("from", "to", "third", "fourth")
 MEASURES = (
@@ -23,9 +24,48 @@ MEASURES = (
     "estimated_error",
     "bias_to_noise",
     "effect",
+    "velocity",
 )
 NUMBER = re.compile(r"\d+")
+MDB_LEVEL, MDB_POWER = 0.001, 0.8  # of NONCENTRALITY
 COMPONENTS = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Detectability:
+    """Test that the minimal detectable bias of an observation refers to.
+
+    level   of the two-sided test of one observation
+    power   probability with which it finds an error of that size
+
+    Raises ArgumentError for values that are no probabilities, and for a power not above the level.
+    """
+
+    level: float = MDB_LEVEL
+    power: float = MDB_POWER
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.level < self.power < 1.0:
+            raise ArgumentError(
+                f"mdb_level = {self.level:g} with power = {self.power:g} (expected probabilities, the power above the "
+                "level)",
+                "mdb_level",
+                "power",
+            )
+
+    @cached_property
+    def noncentrality(self) -> float:
+        """Size of a detectable error, in standard uncertainties of the estimated error."""
+        usual = noncentrality(MDB_LEVEL, MDB_POWER)
+        return float(NONCENTRALITY * noncentrality(self.level, self.power) / usual)
+
+    @property
+    def words(self) -> str:
+        """Level and power in words."""
+        return f"{100.0 * self.level:g} %, power {100.0 * self.power:g} %"
+
+
+USUAL = Detectability()
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +84,7 @@ class ObservationTable:
     bias_to_noise     (m,) largest effect of an error just not detectable on any result, in its standard uncertainties;
                       nan where unknown, as within correlated groups
     effect            (m,) m, largest movement of a named point by an error of the size of mdb, or nan
+    velocity          (m,) m, first velocity correction of a distance whose index of air is known; else nan
     observed, residual, u, redundancy, standardised, mdb, estimated_error   (m,) as in `GroupFit`; mdb is its
                       detectable_error; the last three are nan for unchecked observations, and all four without
                       an answer
@@ -68,6 +109,7 @@ class ObservationTable:
     estimated_error: np.ndarray
     bias_to_noise: np.ndarray
     effect: np.ndarray
+    velocity: np.ndarray
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -81,17 +123,18 @@ class ObservationTable:
         return np.argsort(-np.nan_to_num(size, nan=-1.0), kind="stable")
 
 
-def observation_table(solution: NetworkSolution) -> ObservationTable:
+def observation_table(solution: NetworkSolution, detectability: Detectability = USUAL) -> ObservationTable:
     """Observations of a solution, in file order where known, else group by group.
 
-    solution   an adjusted network
+    solution        an adjusted network
+    detectability   level and power of `mdb`, `bias_to_noise` and `effect`
 
     The sign of components along an axis opposite in the file is reversed, with all derived values.
     """
     network = solution.network
     kinds: dict[str, int] = {}
     effects = effects_at_ends(solution)
-    parts = [_part(solution, g, kinds, effects[g]) for g in range(len(network.groups))]
+    parts = [_part(solution, g, kinds, effects[g], detectability.noncentrality) for g in range(len(network.groups))]
     order = _file_order(network)
     joined = {
         name: np.concatenate([part[name] for part in parts])[order] if parts else np.zeros(0) for name in _COLUMNS
@@ -104,8 +147,10 @@ def observation_table(solution: NetworkSolution) -> ObservationTable:
 _COLUMNS = tuple(ObservationTable.__dataclass_fields__)[1:]
 
 
-def _part(solution: NetworkSolution, g: int, kinds: dict[str, int], effect: np.ndarray) -> dict[str, np.ndarray]:
-    """Columns of one group, given the effects of undetected errors; its kinds are added to `kinds`."""
+def _part(
+    solution: NetworkSolution, g: int, kinds: dict[str, int], effect: np.ndarray, delta: float
+) -> dict[str, np.ndarray]:
+    """Columns of one group, given the effects of undetected errors and the noncentrality; adds to `kinds`."""
     group, fit = solution.network.groups[g], solution.fits[g]
     m = len(fit.residual)
     group_kind = getattr(group, "kind", "") if "kinds" not in type(group).__dict__ else ""  # else a kind per row
@@ -138,11 +183,27 @@ def _part(solution: NetworkSolution, g: int, kinds: dict[str, int], effect: np.n
         "u": fit.sigma,
         "redundancy": np.where(computed, fit.redundancy, np.nan),
         "standardised": tested * fit.standardised,
-        "mdb": np.abs(tested) * fit.detectable_error,
+        "mdb": np.abs(tested) * fit.detectable_error * (delta / NONCENTRALITY),
         "estimated_error": tested * fit.estimated_error,
-        "bias_to_noise": np.where(tested_rows & independent, bias_to_noise(fit.redundancy, NONCENTRALITY), np.nan),
-        "effect": np.where(tested_rows, effect, np.nan),
+        "bias_to_noise": np.where(tested_rows & independent, bias_to_noise(fit.redundancy, delta), np.nan),
+        "effect": np.where(tested_rows, effect * (delta / NONCENTRALITY), np.nan),
+        "velocity": _velocity(group, m),
     }
+
+
+def _velocity(group: object, m: int) -> np.ndarray:
+    """First velocity corrections (m,) m of distances, nan for others: (d - c) (n_ref / n - 1).
+
+    A display d = D n / n_ref + c, with n / n_ref the group's scale and c its known offset; in it stays an unknown zero,
+    some nanometres. Source: [RUEGER90] chapter 6 (first velocity correction); [PARKER04] eq. 5.18 has it in n_g.
+    """
+    index, offset = (
+        np.broadcast_to(getattr(group, name, default), m) for name, default in (("scale", 1.0), ("offset", 0.0))
+    )
+    if getattr(group, "kind", "") not in ("slope_distance", "horizontal_distance") or np.all(index == 1.0):
+        return np.full(m, np.nan)
+    length = np.asarray(getattr(group, "observed", np.nan)) - offset
+    return np.where(index != 1.0, length * (1.0 / index - 1.0), np.nan)
 
 
 def _row_texts(group: object, name: str) -> np.ndarray:

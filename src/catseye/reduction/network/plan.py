@@ -1,4 +1,7 @@
-"""Recipe for a plan: predicted quality, worth of observations, further ranges, Monte Carlo."""
+"""Recipe for a plan: predicted quality, worth of observations, further ranges, Monte Carlo.
+
+Source: [PARKER04] section 3.3 (errors before the measurement, weights).
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,7 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from catseye.aliases import Progress
-from catseye.errors import ArgumentError
+from catseye.errors import ArgumentError, EstimationError
+from catseye.estimation.deformation.comparison import LARGEST
+from catseye.estimation.deformation.deformation import detectable_displacement
+from catseye.estimation.deformation.epoch_model import DatumConnection, EpochModel
 from catseye.estimation.network.model import NetworkSolution, ObservationNetwork
 from catseye.estimation.network.monte_carlo import (
     Disturbance,
@@ -19,6 +25,7 @@ from catseye.estimation.network.monte_carlo import (
     seconds_per_run,
 )
 from catseye.estimation.network.plan import Candidate, Plan, plan, schedule
+from catseye.estimation.quality.ellipsoid import weakest_direction
 from catseye.processors import one_thread
 from catseye.reduction.network.adjusted import AdjustedNetwork, adjusted_network
 from catseye.reduction.network.treatment import AdjustmentOptions, treated
@@ -108,6 +115,27 @@ class PlannedNetwork:
         ]
 
     @cached_property
+    def detectable(self) -> np.ndarray:
+        """Smallest displacements, (n,) m, that a second epoch like this would show, in each point's weakest direction.
+
+        By the congruence test of all points at 5 %, with power 80 %. nan for held points, for those that the others do
+        not check, and for more than 700 points.
+        """
+        return _detectable(self.predicted.solution)
+
+    @cached_property
+    def weakest_motion(self) -> tuple[float, np.ndarray]:
+        """Standard uncertainty, m, of the network's weakest direction, and the share (n,) of each point in it.
+
+        A share is the length of the point's part of the unit vector over all coordinates.
+        """
+        solution, existing = self.predicted.solution, self.predicted.solution.network.points.existing
+        columns = np.flatnonzero(existing.ravel())
+        motion = np.zeros(existing.size)
+        u, motion[columns] = weakest_direction(solution.q.within(columns))
+        return u, np.linalg.norm(motion.reshape(-1, 3), axis=1)
+
+    @cached_property
     def verdict(self) -> Verdict:
         """Verdict on the plan: every point determined and every observation checked."""
         return _verdict(self)
@@ -139,6 +167,20 @@ def planned(
     if options.monte_carlo.runs:
         drawn = monte_carlo_scatter(found.solution, options.monte_carlo, run=run, apart=apart, progress=progress)
     return PlannedNetwork(adjusted_network(found.solution), found, picked, drawn)
+
+
+def _detectable(solution: NetworkSolution) -> np.ndarray:
+    """Detectable displacements between two equal epochs; nan without a test."""
+    names = solution.network.points.names
+    undefined = np.full(len(names), np.nan)
+    if len(names) > LARGEST:
+        return undefined
+    try:
+        connection = DatumConnection.of(solution, solution, None, 0.0)
+        model = EpochModel.of(solution, solution, names, connection)
+        return detectable_displacement(model.epochs(np.arange(len(names))), datum=connection.datum)[0]
+    except EstimationError:  # nothing to compare: every coordinate is held, or none is redundant
+        return undefined
 
 
 def _verdict(planned: PlannedNetwork) -> Verdict:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from catseye.estimation.quality.robustness import (
     snoop,
 )
 from catseye.estimation.quality.variance_components import Components, GroupFactors, RowModel, variance_components
+from catseye.reduction.network.observations import MDB_LEVEL, MDB_POWER, Detectability
 
 FEW = 300  # points up to which a dense solution beside an existing one is the quickest
 NEAR = 1e4  # variance factor of the plain solution up to which the search for wrong observations starts from it
@@ -48,11 +50,13 @@ class AdjustmentOptions:
     components   "rangers": estimate the constant and the ppm part of each ranger's claim; "groups": a factor a group
     scale_by_variance_factor   multiply covariances by the variance factor; tau tests
     level        of all tests of single observations together, and of the chi-square test
+    power        probability with which the test of one observation finds an error of the size of its mdb
+    mdb_level    level of that test
     relative     pairs of points whose relative ellipsoid is wanted
     solver       settings of every solution, whatever the treatment
 
-    Raises EstimationError for an unknown method, ArgumentError for a level that is no probability and for both of
-    `reject` and `robust`.
+    Raises EstimationError for an unknown method, ArgumentError for a level or a power that is no probability and for
+    both of `reject` and `robust`.
     """
 
     datum: str | None = None
@@ -61,6 +65,8 @@ class AdjustmentOptions:
     components: str | None = None
     scale_by_variance_factor: bool = False
     level: float = 0.05
+    power: float = MDB_POWER
+    mdb_level: float = MDB_LEVEL
     relative: Sequence[tuple[str, str]] = ()
     solver: SolverSettings = COMPLETE
 
@@ -69,12 +75,18 @@ class AdjustmentOptions:
             raise ArgumentError("robust cannot go with reject: either weigh or leave out", "robust", "reject")
         if not 0.0 < self.level < 1.0:
             raise ArgumentError(f"level = {self.level:g} is invalid (expected a probability between 0 and 1)", "level")
+        _ = self.detectability
         if self.robust is not None and self.robust not in WEIGHTS:
             raise EstimationError(f"robust method {self.robust!r} is unknown (expected one of {', '.join(WEIGHTS)})")
         if self.components not in (None, "rangers", "groups"):
             raise EstimationError(
                 f"variance components by {self.components!r} are unknown (expected rangers or groups)"
             )
+
+    @cached_property
+    def detectability(self) -> Detectability:
+        """Level and power of the minimal detectable biases."""
+        return Detectability(self.mdb_level, self.power)
 
     @property
     def treats(self) -> bool:

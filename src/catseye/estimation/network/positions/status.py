@@ -28,8 +28,7 @@ TEXTS = {
     PositionStatus.NOT_HELD: "its ranges do not determine it in one direction: it lies in one plane with the stations "
     "that see it, or too far from them for their extent; measure from a station off that plane",
     PositionStatus.DISJOINT: "its {ranges} ranges do not meet in a point: they miss each other by {ratio:.3g} times "
-    "their sigma (limit 5) or, in closed form, by `misclosure`; "
-    "a range is too short, or a station or target was mistaken",
+    "their sigma (limit 5); a range is too short, or a station or target was mistaken",
     PositionStatus.AMBIGUOUS: "the stations that see it lie in one plane and its two mirror images fit equally well; "
     "give a point on its side of the plane (`near`), or a range from off the plane",
     PositionStatus.AT_STATION: "it is within four sigma of a station, where a range has no direction; "

@@ -126,12 +126,16 @@ class AveragedIteration:
     iterations   (...) solutions of eq. 3.7 taken
     status       (...) int8 of `PositionStatus`: FOUND, NOT_CONVERGED (at the limit; x is then invalid), or NOT_HELD
                  (singular)
+    averages     (k, ..., 3) m, x after each of the k steps; of a target that has ended, its last
+    differences  (k, ...) m, between old and new values of each step
     """
 
     x: np.ndarray
     difference: np.ndarray
     iterations: np.ndarray
     status: np.ndarray
+    averages: np.ndarray
+    differences: np.ndarray
 
 
 def trilaterate_by_averaging(
@@ -168,6 +172,7 @@ def trilaterate_by_averaging(
     r = start - origin
     status = np.full(shape, PositionStatus.NOT_CONVERGED, dtype=np.int8)
     difference, steps = np.full(shape, np.nan), np.zeros(shape, dtype=int)
+    averages, differences = [], []
     for _ in range(iterations):
         open_ = status == PositionStatus.NOT_CONVERGED
         if not open_.any():
@@ -180,8 +185,17 @@ def trilaterate_by_averaging(
         singular = open_ & ~np.isfinite(step)
         r = np.where(singular[..., None], np.nan, np.where(open_[..., None], (r + new) / 2, r))
         difference, steps = np.where(open_, step, difference), steps + open_
+        averages.append(r + origin)
+        differences.append(difference)
         status[singular], status[open_ & (step <= epsilon)] = PositionStatus.NOT_HELD, PositionStatus.FOUND
-    return AveragedIteration(r + origin, difference, steps, status)
+    return AveragedIteration(
+        x=r + origin,
+        difference=difference,
+        iterations=steps,
+        status=status,
+        averages=np.array(averages).reshape(-1, *shape, 3),
+        differences=np.array(differences).reshape(-1, *shape),
+    )
 
 
 def _three(stations: np.ndarray, distances: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
