@@ -252,6 +252,58 @@ u_leakage_volt = 0.0002
     )
 
 
+def second_pass(rng: np.random.Generator, planted: bool = False) -> Example:
+    share, angle, coupling = 6e-4, 2.1, -1.2e-3
+    place = 12.0 + np.arange(24) * 0.11 / 24 + 1e-3 * rng.uniform(-1, 1, 24)
+    turn = -2 * np.pi * place / half()
+    full = 5.2 * (1.0 + 0.02 * rng.standard_normal(24))
+    electronics = 1.1 + np.cumsum(1e-3 * rng.standard_normal(24))
+    columns: dict[str, list[str]] = {}
+    for level, volts in (("full", full), ("attenuated", full / 3.1)):
+        glass = 0.031 if level == "attenuated" else 0.0
+        light = volts * np.exp(1j * (turn + coupling * np.log(volts / 5.0) - glass))
+        passes = volts * share * np.exp(-1j * angle) * np.exp(1j * turn)
+        seen = sum(light * passes**k for k in range(6)) * np.exp(1j * electronics)
+        seen = seen + 3e-4 * (rng.standard_normal(24) + 1j * rng.standard_normal(24))
+        phase = np.angle(seen)
+        if planted and level == "full":
+            phase[15] += 5e-3
+        columns[f"phase_{level}_rad"] = [f"{v:.6f}" for v in wrapped(phase)]
+        columns[f"amplitude_{level}_volt"] = [f"{v:.4f}" for v in np.abs(seen)]
+    columns["phase_reference_rad"] = [f"{v:.6f}" for v in wrapped(electronics)]
+    return Example(
+        "second-pass",
+        "Truth: a second pass of 6e-4 for each volt at an angle of 2.1 rad, that is cosine 5.179e-4, sine 3.029e-4;\n"
+        "the phase falls by 1.2 mrad a factor e of amplitude, the attenuator's glass delays it by 31 mrad; 0.3 mV of\n"
+        "noise in each quadrature of a phasor.",
+        "u_phasor_volt = 0.0003\nu_leakage_volt = 0.0001\n",
+        columns,
+        fault="Reading 16 (line 17) is 5 mrad too high at the full return." if planted else "",
+    )
+
+
+def feedback(rng: np.random.Generator, planted: bool = False) -> Example:
+    level = np.repeat([5.0, 2.0, 0.8], 40)
+    fringe = 2 * np.pi * rng.uniform(0, 1, 120)
+    electronics = 0.4 + np.cumsum(1e-3 * rng.standard_normal(120))
+    target = electronics + np.repeat([1.0, 1.3, 1.7], 40) + 8e-4 * np.sqrt(2) * np.cos(fringe)
+    target = target + 3e-4 / level * rng.standard_normal(120)
+    reference = electronics + 3e-4 / 5.0 * rng.standard_normal(120)
+    return Example(
+        "feedback",
+        "Truth: 0.8 mrad rms by a fringe of its own phase each reading; 0.3 mV of noise in each quadrature.",
+        "u_phasor_volt = 0.0003\n",
+        {
+            "set": [f"attenuation-{k}" for k in (1, 2, 3) for _ in range(40)],
+            "phase_target_rad": [f"{v:.6f}" for v in wrapped(target)],
+            "amplitude_target_volt": [f"{v:.4f}" for v in level],
+            "phase_reference_rad": [f"{v:.6f}" for v in wrapped(reference)],
+            "amplitude_reference_volt": ["5.0000"] * 120,
+        },
+        fault="",
+    )
+
+
 def oscillator(rng: np.random.Generator, planted: bool = False) -> Example:
     count = 8192
     time = np.arange(count) * 1e-3
@@ -399,6 +451,65 @@ u_scale_sum_mm = 0.005
     )
 
 
+def reference_cube(rng: np.random.Generator, planted: bool = False) -> Example:
+    steps = np.arange(-240.0, 241.0, 40.0)
+    scans = [(steps, np.zeros(13), "up"), (steps[::-1], np.zeros(13), "down")]
+    scans += [(np.full(13, 12.0), steps, "up"), (np.full(13, 12.0), steps[::-1], "down")]
+    azimuth, elevation = (np.round(np.concatenate([s[k] for s in scans])) for k in (0, 1))
+    sense = [s[2] for s in scans for _ in steps]
+    lag = 1.5 * np.where(np.array(sense) == "up", 1.0, -1.0)  # play of 3 counts: the axis lags behind the counts
+    off = (azimuth - lag - 9.4) / 95.0, (elevation - lag + 14.7) / 110.0
+    volts = 5.2 * np.exp(-0.5 * (off[0] ** 2 + off[1] ** 2)) + 0.012 * rng.standard_normal(52)
+    if planted:
+        volts[19] += 0.4
+    return Example(
+        "reference-cube",
+        "Truth: azimuth 40 191.4 counts, elevation 26 032.3, play 3 counts, peak 5.2 V.",
+        "u_amplitude_volt = 0.012\nu_counts = 0.5\n",
+        {
+            "azimuth_counts": [f"{v + 40182:.0f}" for v in azimuth],
+            "elevation_counts": [f"{v + 26047:.0f}" for v in elevation],
+            "amplitude_volt": [f"{max(v, 0.0):.3f}" for v in volts],
+            "sense": sense,
+        },
+        fault="Reading 20 (line 21) is 0.4 V too high." if planted else "",
+    )
+
+
+def mounting_plate(rng: np.random.Generator, planted: bool = False) -> Example:
+    second = 1.0 / 3600.0
+    zero, collimation = 213.4567, 11.0 * second
+    blocks = {"target-A": 41.2035, "target-B": 131.7780}
+    rows = [(s, t, f) for s in range(1, 7) for t in blocks for f in ("left", "right")]
+    seat = dict(zip(range(1, 7), 2.5 * second * rng.standard_normal(6), strict=True))
+    wrong = dict(zip(blocks, 1.5 * second * rng.standard_normal(2), strict=True))
+    directions = []
+    for s, t, f in rows:
+        side = 1.0 if f == "left" else -1.0
+        reads = zero + seat[s] - blocks[t] - wrong[t] + side * collimation + (0.0 if side > 0 else 180.0)
+        directions.append((reads + 1.2 * second * rng.standard_normal()) % 360.0)
+    if planted:
+        directions[10] += 20.0 * second
+    references = "".join(
+        f'\n[[reference]]\nname = "{name}"\nv_block_deg = {block}      # v-block clockwise from it\n'
+        "u_v_block_arcsec = 1.5\n"
+        for name, block in blocks.items()
+    )
+    return Example(
+        "mounting-plate",
+        "Truth: the circle reads 213.4567 deg towards the v-block, collimation 11 arcsec, a seating scatters by 2.5.",
+        "u_direction_arcsec = 1.2\n" + references,
+        {
+            "seating": [f"seating-{s}" for s, _, _ in rows],
+            "target": [t for _, t, _ in rows],
+            "face": [f for _, _, f in rows],
+            "direction_deg": [f"{v:.5f}" for v in directions],
+        },
+        instrument="plate KP2",
+        fault="Reading 11 (line 12) is 20 arcsec too high." if planted else "",
+    )
+
+
 MAKERS = (
     reference_distance,
     leakage,
@@ -413,6 +524,10 @@ MAKERS = (
     spacers,
     invar_wire,
     repeatability,
+    second_pass,
+    feedback,
+    reference_cube,
+    mounting_plate,
 )  # the place of each is its seed
 
 

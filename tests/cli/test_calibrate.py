@@ -27,6 +27,12 @@ TRUTH = {
     },
     "retroreflector": {"pc_ball-7_mm": -173.715, "pc_prism-12_mm": -33.4937},
     "amplitude-to-phase": {"amplitude_to_phase_rad": -1.8e-3},
+    "second-pass": {
+        "offset_rad": -1.2e-3 * np.log(3.1) + 0.031,
+        "second_pass_cosine_per_volt": 6e-4 * np.sin(2.1),
+        "second_pass_sine_per_volt": -6e-4 * np.cos(2.1),
+    },
+    "feedback": {"feedback_rad": 8e-4},
     "oscillator": {"white_mrad2": 144.0, "flicker_mrad2": 0.0, "walk_mrad2": 0.04},
     "repeatability": {"repeatability_um": 10.0, "between_um": 0.0, "intermediate_um": 10.0},
     "prism-constant": {"height_mm": 38.2040, "hrp_mm": 25.01773, "pc_mm": -33.32272},
@@ -79,14 +85,20 @@ TRUTH = {
         "constant_mm": 2.2,
     },
 }
+TRUTH |= {
+    "reference-cube": {"azm_zrg_counts": 40_191.4, "elv_zrg_counts": 26_032.3, "play_counts": 3.0, "peak_volt": 5.2},
+    "mounting-plate": {"plate_zero_deg": 213.4567, "collimation_arcsec": 11.0},
+}
 TRUTH_OF_PLANTED = {"repeatability": {"between_um": 15.0, "intermediate_um": np.hypot(10.0, 15.0)}}
 WRONG = {
     "reference-distance": 13, "leakage": 29, "leakage-lit": None, "linearity": 77, "retroreflector": 41,
-    "amplitude-to-phase": 9, "oscillator": None, "repeatability": None, "prism-constant": 3,
+    "amplitude-to-phase": 9, "second-pass": 15, "feedback": None, "oscillator": None, "repeatability": None,
+    "prism-constant": 3,
     "ball-constant": None, "gauge-blocks": 12, "spacers": None, "invar-wire": 6,
     "autocollimation": 11, "height-gauge": 19, "both-faces": 8, "both-faces-pointing": 4, "encoder": 17,
     "limits": 8, "alignment": 10, "detector-focus": 19, "search-results": 6, "monument-azimuth": None,
     "plate-levels": None, "monument-place": None, "inclinometer": None, "hydrostatic-level": None,
+    "reference-cube": 19, "mounting-plate": 10,
 }  # fmt: skip
 
 

@@ -186,6 +186,34 @@ def calibrate(
     )
 
 
+def save_calibration_template(kind: str, path: "str | os.PathLike[str]") -> tuple[Path, Path]:
+    """Write the table of a calibration without readings and its sheet with every key, to fill in.
+
+    kind   what is calibrated, as `catseye calibrate --help` lists
+    path   of the table, new; its name ends in .csv; the sheet is beside it with the ending .toml
+
+    Returns both paths. Raises InputError for an unknown kind and where a file exists or cannot be written.
+    """
+    from catseye.gateways.calibrations.template import MARK, template_sheet, template_table
+    from catseye.gateways.writers.output import atomic_file
+    from catseye.reduction.calibrations.kinds import KINDS
+
+    if kind not in KINDS:
+        raise InputError(f"calibration {kind!r} is unknown (expected one of {', '.join(KINDS)})")
+    table = Path(path)
+    if table.suffix != ".csv":
+        raise InputError(f"template {table}: does not end in .csv (expected the name of a table)")
+    if table.exists():
+        raise InputError(f"template {table}: exists (expected a new name: readings would be lost)")
+    example = place_of(f"calibrations/{kind}.csv").read_text(encoding="utf-8").splitlines()[:3]
+    sheet = table.with_suffix(".toml")
+    header = template_table(KINDS[kind])
+    with atomic_file(table, "template", header) as rows, atomic_file(sheet, "template", MARK) as pieces:
+        rows.append(header)
+        pieces.append(template_sheet(kind, KINDS[kind], tuple(example)))
+    return table, sheet
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class CertificateResult(Result):
     """Calibration report of a monument or a mirror: f fields.
@@ -325,6 +353,7 @@ class TripletsResult(Result):
     units         everything else: file and reduction of each sheet
     issue         laboratory and job of a certificate, with statements of conformity
     hashes        SHA-256 of each file
+    replaces      record of the unit whose place a single one takes; None: none
     """
 
     names: tuple[str, ...]
@@ -338,6 +367,7 @@ class TripletsResult(Result):
     units: "tuple[tuple[Path, TripletReduction], ...]"
     issue: "CertificateIssue"
     hashes: dict[Path, str] = field(default_factory=dict)
+    replaces: Path | None = None
 
     def passages(self) -> "Sequence[Passage]":
         """The heights, their difference and what is worth knowing, unit by unit."""
@@ -390,6 +420,18 @@ class TripletsResult(Result):
 
         return {"certificate": certificate_page(CertificateFile(self._subject, self.issue))}
 
+    def save_records(self, where: "str | os.PathLike[str]") -> tuple[Path, ...]:
+        """Write both heights into the units' records, all or none; other keys and comments stay.
+
+        where   directory of records TRnn.toml, or one of them; with a unit to replace a new file, too
+
+        Returns the files. Raises InputError for a unit that is not accepted, for a record of another unit or of
+        other glass, and where nothing can be written.
+        """
+        from catseye.gateways.triplet.record import write_records
+
+        return write_records(Path(where), dict(self.units), self.hashes, replaces=self.replaces)
+
     def _subject(self) -> "CertifiedSubject":
         from catseye.gateways.triplet.certificate import triplet_subject
 
@@ -418,12 +460,14 @@ def triplet(
     *files: "str | os.PathLike[str]",
     laboratory: "str | os.PathLike[str] | None" = None,
     job: "str | os.PathLike[str] | None" = None,
+    replaces: "str | os.PathLike[str] | None" = None,
     progress: Progress | None = None,
 ) -> TripletsResult:
     """Triplet units from their laboratory sheets: H_corr with uncertainty, accepted or not.
 
     files      sheets of measured units (docs/formats/triplet.md)
     laboratory, job   who issues the certificate of a single sheet, for whom (docs/formats/certificates.md)
+    replaces   record of the unit whose place a single one takes, for `save_records`
     progress   called with (what, done, of how many)
 
     Raises InputError for a sheet that cannot be used, and without any.
@@ -466,6 +510,7 @@ def triplet(
         units=tuple(units),
         issue=certificate_issue(results, *certificate_places(laboratory, job)),
         hashes=hashes,
+        replaces=None if replaces is None else place_of(replaces),
     )
 
 

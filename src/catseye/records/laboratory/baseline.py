@@ -3,7 +3,6 @@
 import re
 from datetime import date
 from decimal import Decimal
-from hashlib import sha256
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +10,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from catseye.constants import DEGREE
-from catseye.errors import InputError
 from catseye.records.files.columns import TextColumns, columns_of
 from catseye.records.files.reading import Folder, read_record
 from catseye.records.files.record import Certificate, Version, Within, broken_rule
@@ -233,11 +231,3 @@ def numbers_of(baseline: Baseline, names: tuple[str, ...], file: str) -> dict[st
         if name not in number:
             raise refusal(file, f"pillar {shown(name)} is unknown (expected one of {', '.join(baseline.pillars)})")
     return number
-
-
-def digest_of(path: Path) -> str:
-    """SHA-256 of a file that was read before."""
-    try:
-        return sha256(path.read_bytes()).hexdigest()
-    except OSError as problem:
-        raise InputError(f"{path}: cannot be read: {problem.strerror or problem}") from problem

@@ -4,6 +4,8 @@ Shots and weather to pillars, and to the zero, scale and cyclic terms of the ins
 
 Signs: observed = (1 + scale) D + zero + cyclic. An instrument that reads too much has zero above 0; the correction that
 the standard adds to readings is -zero.
+
+Source: [PARKER04] section 7.3.4 (total stations on a baseline).
 """
 
 from dataclasses import replace

@@ -1,4 +1,7 @@
-"""The notes' two calibration reports: fields in printed order, filled from a record or blank."""
+"""The notes' two calibration reports: fields in printed order, filled from a record or blank.
+
+Source: [PARKER04] Figures 2.2 and 2.4.
+"""
 
 import math
 from collections.abc import Callable
@@ -300,19 +303,6 @@ def _matrix(form: Form, record: Reported | None) -> tuple[ReportField, ...]:
         ]
         fields.append(ReportField(entry, float(value), combined(rows), significant(rows)))
     return tuple(fields)
-
-
-def matrix_uncertainty(turned: Callable[..., np.ndarray], angles: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Standard uncertainties (3, 3) of a rotation matrix's elements.
-
-    turned    function from the angles to the matrix
-    angles    (n,), rad
-    u         (n,), rad, of each angle, independent
-
-    Source: [JCGM100] eq. 10. The derivatives are exact: in each angle t an element is a cos t + b sin t + c, whose
-    derivative is half the difference of its values at t ± a quarter turn.
-    """
-    return np.sqrt(np.einsum("k,kij->ij", u**2, matrix_slopes(turned, angles) ** 2))
 
 
 def matrix_slopes(turned: Callable[..., np.ndarray], angles: np.ndarray) -> np.ndarray:

@@ -16,14 +16,16 @@ from catseye.reduction.calibrations.mirror import (
     detector_focus,
     encoder,
     limits,
+    reference_cube,
     search_results,
 )
 from catseye.reduction.calibrations.monument import azimuth as monument_azimuth
-from catseye.reduction.calibrations.monument import hydrostatic_level, inclinometer, plate_levels
+from catseye.reduction.calibrations.monument import hydrostatic_level, inclinometer, mounting_plate, plate_levels
 from catseye.reduction.calibrations.monument import place as monument_place
 from catseye.reduction.calibrations.plausibility import judged
 from catseye.reduction.calibrations.ranging import (
     amplitude,
+    feedback,
     glass_constants,
     leakage,
     leakage_lit,
@@ -32,6 +34,7 @@ from catseye.reduction.calibrations.ranging import (
     reference_distance,
     repeatability,
     retroreflector,
+    second_pass,
 )
 
 WEATHER = ("temperature_c", "pressure_hpa", "humidity_percent")
@@ -42,6 +45,8 @@ KINDS: dict[str, CalibrationKind] = {
     "linearity": linearity.RECIPE,
     "retroreflector": retroreflector.RECIPE,
     "amplitude-to-phase": amplitude.RECIPE,
+    "second-pass": second_pass.RECIPE,
+    "feedback": feedback.RECIPE,
     "oscillator": oscillator.RECIPE,
     "repeatability": repeatability.RECIPE,
     "prism-constant": glass_constants.PRISM_RECIPE,
@@ -63,6 +68,8 @@ KINDS: dict[str, CalibrationKind] = {
     "monument-place": monument_place.RECIPE,
     "inclinometer": inclinometer.RECIPE,
     "hydrostatic-level": hydrostatic_level.RECIPE,
+    "reference-cube": reference_cube.RECIPE,
+    "mounting-plate": mounting_plate.RECIPE,
 }
 
 

@@ -124,7 +124,8 @@ def effective_degrees(design: np.ndarray, components: Sequence[np.ndarray], cova
     information = variance_information(design, components, covariance)
     slope = np.stack([np.einsum("pi,ij,pj->p", gain, q, gain) for q in components])
     spread = 2.0 * np.einsum("kp,kl,lp->p", slope, np.linalg.pinv(information), slope)
-    return 2.0 * np.diag(inverse) ** 2 / spread
+    with np.errstate(divide="ignore"):  # a parameter that no estimated factor touches: infinite degrees
+        return 2.0 * np.diag(inverse) ** 2 / spread
 
 
 def variance_information(design: np.ndarray, components: Sequence[np.ndarray], covariance: np.ndarray) -> np.ndarray:

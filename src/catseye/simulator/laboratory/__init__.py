@@ -1,1 +1,1 @@
-"""Simulated laboratory instruments: refractometer, sound, triplet stand, panel tool."""
+"""Simulated laboratory instruments: sound, triplet stand, panel tool."""

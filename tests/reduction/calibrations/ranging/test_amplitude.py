@@ -1,4 +1,4 @@
-"""Amplitude-to-phase: sign, wrapping, leakage, the test of the line, against the signal formula, scatter."""
+"""Amplitude-to-phase: sign, wrapping, leakage, the test of the line, against numpy's polynomials, scatter."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,6 @@ import pytest
 from calibration_scene import RUNS
 from catseye.errors import EstimationError
 from catseye.reduction.calibrations.ranging.amplitude import LAYOUT, calibrate_amplitude
-from catseye.signal.systematics.amplitude import fit_amplitude_phase
 
 BASE = {"reference_amplitude_volt": 5.0, "u_leakage_volt": 0.0}
 LEVELS = np.repeat(np.geomspace(0.15, 5.0, 8), 3)
@@ -32,16 +31,17 @@ def test_the_phase_origin_does_not_matter(table, phase):
     assert found.value("amplitude_to_phase_rad") == pytest.approx(-3e-3, abs=1e-12)
 
 
-def test_it_agrees_with_the_signal_formula(table):
+def test_it_is_numpys_polynomial_and_tests_the_next_power(table):
     rng = np.random.default_rng(0)
     numbers = columns(LEVELS, -1.8e-3)
     numbers["phase_target_rad"] = numbers["phase_target_rad"] + 3e-4 / LEVELS * rng.standard_normal(len(LEVELS))
     found = calibrate_amplitude(table(LAYOUT, numbers, **BASE, u_phasor_volt=3e-4))
-    other = fit_amplitude_phase(LEVELS, numbers["phase_target_rad"], 3e-4 / LEVELS, reference_amplitude=5.0)
-    assert found.value("amplitude_to_phase_rad") == pytest.approx(other.coefficient, rel=1e-9)
-    assert found.u("amplitude_to_phase_rad") == pytest.approx(other.u_coefficient, rel=1e-9)
-    line = found.decisions[0]
-    assert line.statistic == pytest.approx(abs(other.curvature), rel=1e-6)
+    x, y, weight = np.log(LEVELS / 5.0), numbers["phase_target_rad"], LEVELS / 3e-4
+    (slope, _), covariance = np.polyfit(x, y, 1, w=weight, cov="unscaled")
+    assert found.value("amplitude_to_phase_rad") == pytest.approx(slope, rel=1e-9)
+    assert found.u("amplitude_to_phase_rad") == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-9)
+    (bend, _, _), covariance = np.polyfit(x, y, 2, w=weight, cov="unscaled")
+    assert found.decisions[0].statistic == pytest.approx(abs(bend) / np.sqrt(covariance[0, 0]), rel=1e-6)
 
 
 def test_the_reference_takes_the_drift_of_the_electronics(table):

@@ -108,8 +108,8 @@ def _along(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationF
 def _circle(readings: SheetReadings, z: np.ndarray, reject: bool) -> CalibrationFit:
     """Fit with unknown positions: distances from a circle, linearised."""
     on = readings.active
-    circle = circle_leakage(z[on], 1e-6 * float(np.median(np.abs(z[on]))))  # equal weights; their size is of no matter
-    point = np.array([circle.phasor.real, circle.phasor.imag, float(np.mean(np.abs(z[on] - circle.phasor)))])
+    centre = circle_leakage(z[on])
+    point = np.array([centre.real, centre.imag, float(np.mean(np.abs(z[on] - centre)))])
     scatter = _scatter(readings, 1)
     for _ in range(ROUNDS):
         arm = z - complex(point[0], point[1])

@@ -110,7 +110,7 @@ def _separable(rail: Rail, readings: SheetReadings) -> tuple[tuple[int, ...], st
     room = (int(on.sum()) - 4) // 2  # readings that are left over must tell the scatter
     tried = min(requested, max(room, 0))
     columns = np.column_stack([np.ones(len(length)), length - length.mean()])
-    separate = separable_orders(phase, tried, others=columns).orders if tried else ()
+    separate = separable_orders(phase, tried, nuisance=columns).orders if tried else ()
     orders = tuple(k for k, got in zip(range(1, tried + 1), separate, strict=False) if k == got)
     if len(orders) < requested:
         text = (

@@ -1,0 +1,1 @@
+"""Scans and searches: `fit_scan`, `angles_scan`, `search_scan`."""

@@ -1,0 +1,1 @@
+"""Texts, objects and figures of scans and searches."""

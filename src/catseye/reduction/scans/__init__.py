@@ -1,0 +1,1 @@
+"""Measured scans over retroreflectors: spots, and returns by angle; searches."""
