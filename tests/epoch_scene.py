@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from catseye.estimation.deformation.congruence import Epochs
+from catseye.estimation.deformation.congruence import KNOWN, Epochs, differences, global_test
 from catseye.estimation.shapes.rigid_body import motion_columns
 
 SIGMA = 20e-6  # m
@@ -46,6 +46,12 @@ class Field:
 
 
 FIELD = Field()
+
+
+def congruence_test(epochs, *, datum="rigid", variance_factor=KNOWN):
+    """The test that nothing moved, alone: what `moved_points` begins with."""
+    fit = differences(epochs, datum, np.ones(len(epochs.names), dtype=bool)).fit()
+    return global_test(fit.pvv, fit.degrees_of_freedom, variance_factor)
 
 
 def movement(moves, n=9):

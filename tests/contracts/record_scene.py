@@ -37,7 +37,8 @@ UNITS = {  # end of a key -> unit; the longest end counts
     "_ppm": "ppm", "_mw": "mW", "_ohm": "Ω", "_pf": "pF", "_n": "N", "_n_per_m": "N/m", "_m_per_s": "m/s",
     "_per_s": "1/s", "_km_s": "km/s", "_mas": "mas", "_ppm_per_c": "ppm/°C", "_um_per_c": "µm/°C", "_deg_s": "°/s",
     "_mrad_per_sqrt_hour": "mrad/√h", "_mrad_per_root_hour": "mrad/√h", "_rad_per_sqrt_hour": "rad/√h",
-    "_mm_per_sqrt_hour": "mm/√h", "_volt_per_rad": "V/rad", "_arcsec_per_mm_x": "″/mm", "_arcsec_per_mm_y": "″/mm",
+    "_mm_per_sqrt_hour": "mm/√h", "_per_volt": "1/V", "_volt_per_rad": "V/rad", "_arcsec_per_mm_x": "″/mm",
+    "_arcsec_per_mm_y": "″/mm",
     "_count": "counts",
 }  # fmt: skip
 TYPES = {float: "number", int: "integer", str: "text", bool: "true or false", dict: "table", Any: "any"}

@@ -45,6 +45,8 @@ OBJECTS = (  # commands, in this order, whose JSON objects are looked at; some s
     "refractometer refractometer/path-a.csv",
     "acoustic acoustic/evening-1.wav --sheet acoustic/evening.toml",
     "panels panels/as-found.csv --instrument panels/tool.toml --layout gbt",
+    "model displace structural-model/telescope.toml --posture 145,45 --site gbt --points ZEG41040L",
+    "model fit structural-model/telescope.toml structure/epochs.csv --free alidade:turn_x",
     "reduce night-01 --out night",
     "explain night-01 120",
     "surface night",

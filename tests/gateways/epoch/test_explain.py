@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from catseye.gateways.epoch.explain import budget_lines, explanation_object, explanation_passages
-from catseye.gateways.epoch.explain_figures import figures
+from catseye.gateways.epoch.explain_figures import _colour, figures
 from catseye.gateways.epoch.explain_page import MARK, explanation_report
 from catseye.gateways.writers.drawing import svgs
 from catseye.gateways.writers.objects import json_line
@@ -163,3 +163,8 @@ def test_figures_are_drawn_the_same_each_time(explained):
     assert first == second
     assert set(first) == {"contributions", "histogram"}
     assert set(figures(dataclasses.replace(found, scattered=None))) == {"contributions"}
+
+
+@pytest.mark.parametrize("key", ["second pass cosine", "feedback", "image"])
+def test_effects_of_a_head_have_its_colour(key):
+    assert _colour(key) == _colour("leakage real") != _colour("noise")

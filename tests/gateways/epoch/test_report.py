@@ -9,6 +9,7 @@ import pytest
 
 from catseye.constants import MILLIMETRE
 from catseye.gateways.epoch.objects import pose_object
+from catseye.gateways.epoch.record_tests import listed_tests
 from catseye.gateways.epoch.report import reduction_report
 from catseye.gateways.epoch.summary import passages
 from catseye.gateways.epoch.tables import ranges_csv
@@ -17,7 +18,9 @@ from catseye.gateways.writers.report import report_object
 from catseye.gateways.writers.report_page import report_page
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.reason import Reason, ShotStatus
-from gateways.report_scene import blocks, column, read, texts, words_of
+from catseye.reduction.site.plausible.record import ImplausibleRecord
+from gateways.record_scene import with_checks
+from gateways.report_scene import blocks, column, read, row, texts, words_of
 
 WHEN = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 
@@ -58,7 +61,7 @@ def test_words_are_readable_without_scripts(page, reduction):
 def test_it_shows_every_point_every_rejected_shot_and_every_section(report, reduction):
     assert column(report, "points", "point") == list(reduction.coordinates.points)
     assert column(report, "rejected", "shot") == sorted(reduction.rejected)
-    sections = "feed-arm dish network residuals rejected rangers air points shots provenance"
+    sections = "feed-arm dish network records residuals rejected rangers air checks points shots provenance"
     assert [section["id"] for section in report["sections"]] == sections.split()
     assert report["scenes"].keys() == {"network"}
     assert report["charts"].keys() >= {"dish", "residuals-by-time", "w-by-ranger", "w-by-target", "w-by-elevation",
@@ -181,6 +184,132 @@ def test_passages_contain_the_numbers(reduction):
     assert f"{reduction.coordinates.variance_factor:.2f}" in told["Reliability"]
 
 
+@pytest.fixture(scope="module")
+def doubted(reduction):
+    """A report with contradictions, unchecked points and an unmeasured target."""
+    return read(report_page(reduction_report(with_checks(reduction, 70), WHEN)))
+
+
+def test_contradictions_have_their_records_and_errors(doubted):
+    assert column(doubted, "contradictions", "contradiction") == [1, 1, 1, 2, 2]
+    assert column(doubted, "contradictions", "record") == [
+        "monument ZY103", "monument ZY103", "monument ZY103", "benchmark ZBM01", "zero ZY101",
+    ]  # fmt: skip
+    assert column(doubted, "contradictions", "error") == [1, -0.12, 0.003, 0.92, -0.9]
+    said = texts(doubted)
+    assert "the ranges contradict monument ZY103 by east +1.000" in said
+    assert "the ranges contradict one of these: benchmark ZBM01 by +0.920 mm" in said
+
+
+def test_each_group_has_its_worst_record_and_its_untested_numbers(doubted, reduction):
+    tests = listed_tests(with_checks(reduction, 70).coordinates)
+    for group in {test.group for test in tests}:
+        of_group = [test for test in tests if test.group == group]
+        worst = max((test for test in of_group if np.isfinite(test.w)), key=lambda test: abs(test.w))
+        shown = row(doubted, "record-groups", str(group))
+        assert shown["w"] == pytest.approx(worst.w, abs=6e-4)
+        assert shown["worst"] == f"{worst.record} {worst.part}".strip()
+        assert (shown["numbers"], shown["untested"]) == (len(of_group), 1)
+    assert row(doubted, "record-groups", "monuments")["chi_squared"] == "421.5 of 36"
+    assert row(doubted, "record-groups", "monuments")["probability"] == "below 0.001"
+    assert row(doubted, "record-groups", "ranger zeros")["probability"] == "0.506"
+
+
+def test_the_largest_w_of_each_group_are_in_the_table(doubted, reduction):
+    tests = listed_tests(with_checks(reduction, 70).coordinates)
+    groups = column(doubted, "record-tests", "group")
+    assert {groups.count(group) for group in groups} == {6}
+    w = dict(zip(column(doubted, "record-tests", "record"), column(doubted, "record-tests", "w"), strict=True))
+    monuments = sorted((t for t in tests if t.group == "monuments" and np.isfinite(t.w)), key=lambda t: -abs(t.w))
+    for test in monuments[:6]:
+        assert w[f"{test.record} {test.part}"] == pytest.approx(test.w, abs=6e-5)
+
+
+def test_the_chart_of_records_says_what_it_leaves_out(doubted, reduction):
+    chart = doubted["charts"]["record-tests"]
+    named = [chart["x"]["categories"][round(x)] for x in chart["x"]["values"]]
+    assert named.count("monuments") == 100  # of 210
+    assert named.count("benchmarks") == 70
+    at = chart["name"].index("benchmark ZBM01")
+    assert chart["y"]["values"][at] == 12  # of 92
+    marked = {name for name, group in zip(chart["name"], chart["group"], strict=True) if group}
+    assert "benchmark ZBM01" in marked
+    assert not any(name.startswith("mirror") for name in marked)
+    said = texts(doubted)
+    assert "3 with |w| above 12 are drawn at the edge" in said  # monument 20, certificate 92, zero -82
+    assert "Of a group of more than 100, those with the largest |w|" in said
+
+
+def test_records_that_no_site_has_come_first(reduction):
+    record = ImplausibleRecord("weather.csv: humidity_pct", "WX1 reads 0 % throughout", "humidity", ("WX1",))
+    report = read(report_page(reduction_report(replace(reduction, implausible=(record,)), WHEN)))
+    (section,) = [section for section in report["sections"] if section["id"] == "records"]
+    kinds = [block["kind"] for block in section["blocks"]]
+    assert section["blocks"][kinds.index("list")]["items"] == ["weather.csv: humidity_pct: WX1 reads 0 % throughout."]
+    assert kinds.index("heading") < kinds.index("table")
+    assert "Records that no site has" not in texts(read(report_page(reduction_report(reduction, WHEN))))
+
+
+def test_points_stand_by_their_lines_and_unchecked_ones_by_name(doubted, reduction):
+    coordinates = reduction.coordinates
+    count = {name: sum(name in pair for pair in lines(coordinates.ranges)) for name in coordinates.points}
+    ranged = [name for name in coordinates.points if not name.endswith("-F")]
+    for text in ("1", "5", "10 or more"):
+        wanted = [n for n in ranged if (count[n] >= 10 if text == "10 or more" else count[n] == int(text))]
+        shown = row(doubted, "lines", text)
+        assert shown["points"] == len(wanted) > 0
+        assert shown["unchecked"] == len({"DP003", "ZEG41040L"} & set(wanted))
+    assert column(doubted, "unchecked", "point") == ["DP003", "ZEG41040L"]
+    assert row(doubted, "unchecked", "ZEG41040L")["lines"] == count["ZEG41040L"]
+    assert row(doubted, "unmeasured", "ZEG41099L")["reasons"] == "no shot"
+    at = column(doubted, "points", "point").index("DP003")
+    assert column(doubted, "points", "status")[at] == "unchecked"
+    assert column(doubted, "points", "status").count("unchecked") == 2
+
+
+def lines(ranges):
+    """Pairs of ranger and target with a used shot."""
+    return {(r, t) for r, t, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True) if used}
+
+
+def test_an_unmeasured_target_has_the_fate_of_its_shots(reduction):
+    status = list(reduction.status)
+    shots = [k for k, target in enumerate(reduction.campaign.shots.target) if target == "DP007"]
+    for k in shots:
+        status[k] = ShotStatus.BLOCKED
+    status[shots[0]] = ShotStatus.REFLECTED
+    lost = replace(reduction.coordinates, unmeasured=("DP007",))
+    report = read(report_page(reduction_report(replace(reduction, coordinates=lost, status=tuple(status)), WHEN)))
+    shown = row(report, "unmeasured", "DP007")
+    assert shown["shots"] == len(shots)
+    assert shown["reasons"] == f"{len(shots) - 1} blocked, 1 reflected"
+
+
+def test_scatter_of_classes_is_shown_with_its_sway_in_millimetres(doubted):
+    assert column(doubted, "scatter", "class") == ["dish", "feed arm"]
+    assert column(doubted, "scatter", "variance_factor") == [0.98, 1.02]
+    assert column(doubted, "scatter", "sway") == [None, 0.31]
+    assert "feed arm 1.02 with a sway of 0.31 mm included" in texts(doubted)
+
+
+def test_cards_count_contradictions_and_unchecked_points(doubted):
+    cards = {card["name"]: card for card in doubted["cards"]}
+    assert cards["Contradictions"]["value"] == "2"
+    assert "92.0" in cards["Contradictions"]["remark"]
+    assert cards["Unchecked points"]["value"] == "2"
+
+
+def test_a_night_whose_records_agree_says_so(reduction):
+    agreeing = with_checks(reduction)
+    quiet = tuple(replace(test, error=0.1 * test.u_error) for test in agreeing.coordinates.records)
+    coordinates = replace(agreeing.coordinates, records=quiet, contradictions=(), unchecked=(), unmeasured=())
+    report = read(report_page(reduction_report(replace(agreeing, coordinates=coordinates), WHEN)))
+    assert "The ranges contradict no record." in texts(report)
+    assert report["charts"]["record-tests"]["groups"] == ["not contradicted"]
+    assert not {"contradictions", "unchecked", "unmeasured"} & report["tables"].keys()
+    assert {card["name"]: card["value"] for card in report["cards"]}["Contradictions"] == "none"
+
+
 @pytest.mark.parametrize(
     "keep",
     [
@@ -197,6 +326,7 @@ def test_a_part_of_the_night_is_reported_too(reduction, keep):
         if column.name in ("ranger", "target")
         else getattr(shots, column.name)[kept]
         for column in fields(shots)
+        if getattr(shots, column.name) is not None  # one frequency
     }
     part = reduce_epoch(replace(reduction.campaign, shots=type(shots)(**columns)))
     report = read(report_page(reduction_report(part, WHEN)))
@@ -204,3 +334,23 @@ def test_a_part_of_the_night_is_reported_too(reduction, keep):
     assert pose_object(part)["reason"] == part.no_surface == part.notes[-1]
     assert len([line for line in ranges_csv(part).splitlines() if line]) == len(kept) + 1
     assert json_page(pose_object(part))
+
+
+def test_chart_of_harmonics_has_the_largest_and_every_distorted_shot(reduction, monkeypatch):
+    """A report of a whole dish travels by mail: its chart has part of the shots, and says so."""
+    monkeypatch.setattr("catseye.gateways.detection.night_harmonics.CHARTED", 30)
+    phases = reduction.phases
+    usable = np.flatnonzero([reason is None for reason in phases.reason])
+    largest = phases.relative_harmonics.max(axis=1)
+    bent = usable[np.argsort(largest[usable])[:40]]  # those that the chart would leave out first
+    distorted = np.zeros_like(phases.distorted)
+    distorted[bent] = True
+    for marked, most in ((phases.distorted, 30), (distorted, 40)):
+        monkeypatch.setattr(type(phases), "distorted", marked)
+        part = report_object(reduction_report(reduction, WHEN))
+        chart = part["charts"]["harmonics"]
+        drawn = {int(name) for name in chart["name"]}
+        wanted = bent if marked.any() else usable[np.argsort(largest[usable])[-most:]]
+        assert drawn == set(reduction.campaign.shots.shot[wanted].tolist())
+        (caption,) = (block["caption"] for block in blocks(part, "chart") if block["chart"] == "harmonics")
+        assert f"The {most} largest are drawn" in caption

@@ -10,9 +10,11 @@ import pytest
 from astropy.io import fits
 
 import catseye.gateways.epoch.objects as objects_module
+from catseye.gateways.epoch.record_tests import listed_tests
 from catseye.gateways.epoch.results_fits import results_fits
 from catseye.gateways.epoch.tables import COORDINATES, RANGES, SURFACE
 from catseye.gateways.writers.samplers_fits import read_samplers
+from gateways.record_scene import with_checks
 from kept_scene import reduction_directory, reduction_of_example
 
 BLOCK, CARD = 2880, 80  # bytes, by the FITS standard
@@ -69,7 +71,10 @@ def test_astropy_and_its_checksums_accept_it(directory):
     with fits.open(directory / "results.fits", checksum=True) as pages:  # warnings are errors
         pages.verify("exception")
         names = [page.name for page in pages]
-        assert names == ["PRIMARY", "POINTS", "RANGES", "SURFACE", "POSE", "ZEROS", "COVARIANCE", "PROVENANCE"]
+        checks = ["RECORDS", "GROUPS", "SCATTER"]
+        assert names == [
+            "PRIMARY", "POINTS", "RANGES", "SURFACE", "POSE", "ZEROS", *checks, "COVARIANCE", "PROVENANCE",
+        ]  # fmt: skip
         header = pages[0].header
     assert (header["CAMPAIGN"], header["TIMESYS"], header["VERDICT"]) == ("night-01", "UTC", "good")
     assert header["DATE-BEG"].startswith("2003-09-07T03:00:29.")
@@ -139,6 +144,31 @@ def test_zeros_and_pose_are_in_metres_and_radians(tables):
     assert units_of(tables["COVARIANCE"][1])["COVARIANCE"] == "m2"
 
 
+def test_records_contradictions_and_scatter_are_tables(directory):
+    doubted = with_checks(reduction_of_example(), 2)
+    coordinates = doubted.coordinates
+    found = plain_tables(results_fits(doubted))
+    records, header = found["RECORDS"]
+    assert texts(records["RECORD"]) == [test.record for test in listed_tests(coordinates)]
+    assert texts(records["GROUP"]) == [test.group for test in listed_tests(coordinates)]
+    error = np.array([test.error for test in listed_tests(coordinates)])
+    np.testing.assert_array_equal(records["ERROR"], error)
+    u = [test.u_error if np.isfinite(test.u_error) else np.nan for test in listed_tests(coordinates)]
+    np.testing.assert_array_equal(records["U_ERROR"], u)
+    assert units_of(header)["UNIT"] == ""
+    contradictions, _ = found["CONTRADICTIONS"]
+    assert contradictions["CONTRADICTION"].tolist() == [1, 1, 1, 2, 2]
+    assert contradictions["RANK"].tolist() == [1, 1, 1, 1, 2]
+    assert contradictions["ERROR"].tolist() == [1.0, -0.12, 0.003, 0.92, -0.9]
+    groups, _ = found["GROUPS"]
+    assert groups["DOF"].tolist() == [36, 18]
+    assert groups["PROBABILITY"].tolist() == [3e-67, 0.5062]
+    scatter, header = found["SCATTER"]
+    assert scatter["SWAY"].tolist() == [0.0, 0.00031]
+    assert units_of(header)["SWAY"] == "m"
+    assert texts(found["UNMEASURED"][0]["POINT"]) == ["ZEG41099L"]
+
+
 def test_the_provenance_names_each_input_with_its_hash(directory, tables):
     rows, _ = tables["PROVENANCE"]
     told = json.loads((directory / "provenance.json").read_text())
@@ -171,4 +201,5 @@ def test_many_points_leave_the_covariance_to_its_own_file(monkeypatch):
 
 def test_a_night_without_a_dish_has_neither_surface_nor_pose():
     without = replace(reduction_of_example(), surface=None)
-    assert list(plain_tables(results_fits(without))) == ["POINTS", "RANGES", "ZEROS", "COVARIANCE", "PROVENANCE"]
+    names = list(plain_tables(results_fits(without)))
+    assert names == ["POINTS", "RANGES", "ZEROS", "RECORDS", "GROUPS", "SCATTER", "COVARIANCE", "PROVENANCE"]

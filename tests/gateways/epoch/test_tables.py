@@ -95,11 +95,13 @@ def test_the_corrections_of_a_range_add_up_to_it_and_its_phase_is_a_difference(w
 
 
 def test_every_column_of_the_ranges_has_the_unit_of_its_name(reduction):
-    """In night-01 no head stands off its scan point and no shot is thin: here some do and are."""
+    """In night-01 no head stands off its scan point, no shot is thin and none distorted: here some do and are."""
     campaign, phases, coordinates = reduction.campaign, reduction.phases, reduction.coordinates
+    bent = np.where((np.arange(len(phases.phasor)) % 11 == 0)[:, None], phases.amplitude[:, None], phases.harmonics)
+    phases = replace(phases, harmonics=bent)
     count = len(coordinates.ranges.shot)
     ranges = replace(coordinates.ranges, head=np.linspace(-3e-3, 5e-3, count), thin=np.arange(count) % 7 == 0)
-    changed = replace(reduction, coordinates=replace(coordinates, ranges=ranges))
+    changed = replace(reduction, phases=phases, coordinates=replace(coordinates, ranges=ranges))
     shots, row = campaign.shots, {int(shot): k for k, shot in enumerate(ranges.shot)}
     half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz
 
@@ -119,6 +121,9 @@ def test_every_column_of_the_ranges_has_the_unit_of_its_name(reduction):
         "amplitude_v": lambda k: phases.amplitude[k],
         "phase_rad": lambda k: phases.phase[k],
         "u_phase_rad": lambda k: phases.u_phase[k],
+        "harmonic_2": lambda k: phases.harmonics[k, 0] / phases.amplitude[k],
+        "harmonic_3": lambda k: phases.harmonics[k, 1] / phases.amplitude[k],
+        "distorted": lambda k: "distorted" if k % 11 == 0 and phases.reason[k] is None else "",
         "electronics_rad": ranged(lambda k: ranges.electronics[k] % TWO_PI),
         "difference_rad": ranged(lambda k: ranges.phase[k]),
         "cycles": ranged(lambda k: ranges.cycles[k]),
@@ -159,6 +164,8 @@ def test_every_column_of_the_coordinates_has_the_unit_of_its_name(written, reduc
         **{f"cov_{'xyz'[a]}{'xyz'[b]}_mm2": lambda i, a=a, b=b: q(i, a, b) for a, b in ((0, 1), (0, 2), (1, 2))},
         "shots": lambda i: found.shots[i],
         "from_approximate_mm": lambda i: np.linalg.norm(found.x[i] - found.start[i]),
+        "lines": lambda i: found.lines[i],
+        "status": lambda i: "unchecked" if found.points[i] in found.unchecked else "checked",
     }
     assert_columns((written / "coordinates.csv").read_text(), told, range(len(found.points)))
 

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from catseye.atmosphere.index.air import group_refractivity, group_refractivity_of_vapour
+from catseye.atmosphere.index.air import MODELS, group_refractivity
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
@@ -217,7 +217,7 @@ def test_sound_replaces_the_thermometers_on_its_line_but_not_the_vapour(night_01
     assert found.refractivity[1] == plain.refractivity[1]
     pressure = 900.0 + 0.11 * 25.0
     vapour = float(vapour_pressure_hpa(10.0, pressure, 50.0))
-    expected = group_refractivity_of_vapour(16.0, pressure, vapour, wavelength_um=0.78, model="rueger1990")
+    expected = MODELS["rueger1990"].refractivity(16.0, pressure, vapour, wavelength_um=0.78, co2_ppm=300.0)
     assert found.refractivity[0] == pytest.approx(float(expected), abs=1e-13)
     assert found.refractivity[0] < plain.refractivity[0] - 5e-6  # 6 °C warmer
     assert field.names == ("S0", "S1", "bend", "T - ZY101")

@@ -11,11 +11,12 @@ from catseye.estimation.least_squares.adjustment import adjust
 from catseye.optics.retroreflector.kinds.registry import PRISM
 from catseye.reduction.epoch import coordinates
 from catseye.reduction.epoch.common_errors import ALIKE_M, CommonError, _smooth, common_errors, considered, reach_of
-from catseye.reduction.epoch.cycles import resolve_cycles
+from catseye.reduction.epoch.lines.cycles import resolve_cycles
+from catseye.reduction.epoch.prior_names import BENCHMARKS, MONUMENTS, OFFSETS, TRIPLET_BALLS, ZEROS
 from catseye.reduction.epoch.ranges import follow_electronics, measure_phases
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.settling import iterate_adjustment
-from catseye.reduction.epoch.unknowns import BENCHMARKS, MONUMENTS, OFFSETS, TRIPLET_BALLS, ZEROS, build_network
+from catseye.reduction.epoch.unknowns import build_network
 
 
 @pytest.fixture(scope="module")

@@ -278,5 +278,6 @@ def test_a_monument_60_mm_wrong_is_named_as_the_ranger_that_lost_its_shots(few_0
     campaign = dataclasses.replace(few_01, monuments={**few_01.monuments, "ZY105": wrong})
     reduction = reduce_epoch(campaign)
     assert any(note.startswith("ZY105: 8 of its 8 shots do not fit") for note in reduction.notes)
+    assert "ZY105" in reduction.coordinates.unchecked
     names = [n for n in reduction.coordinates.points if not n.startswith("ZY105")]
     agrees(honest(reduction), reduced_few_01.coordinates, [n for n in names if n.startswith(("TR", "DP0"))])

@@ -11,6 +11,7 @@ from catseye.estimation.least_squares.adjustment import NONCENTRALITY, adjust
 from catseye.estimation.observations.kinds import Linear
 from catseye.optics.retroreflector.kinds.registry import HOLLOW
 from catseye.reduction.epoch.air.process import LEAST, MOST, USUAL, WIDE, AirKnots, AirStrength
+from catseye.reduction.epoch.motion.telescope_motion import PARTS, WALK, TelescopeKnots
 from catseye.reduction.epoch.strengths import (
     ERRORS,
     EXPERIENCE,
@@ -23,7 +24,6 @@ from catseye.reduction.epoch.strengths import (
     _Evidence,
     with_processes,
 )
-from catseye.reduction.epoch.telescope_motion import PARTS, WALK, TelescopeKnots
 from catseye.reduction.site.places import RangedPoint
 
 LOW, HIGH = (1e-3,), (10.0,)

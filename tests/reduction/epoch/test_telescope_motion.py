@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from catseye.constants import MILLIMETRE, PPM
 from catseye.optics.retroreflector.kinds.registry import HOLLOW
-from catseye.reduction.epoch.telescope_motion import PARTS, STEP, UNITS, TelescopeKnots
+from catseye.reduction.epoch.motion.telescope_motion import PARTS, STEP, UNITS, TelescopeKnots
 from catseye.reduction.site.places import RangedPoint
 
 PLACES = {

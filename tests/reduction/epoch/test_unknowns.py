@@ -7,7 +7,8 @@ import pytest
 
 from catseye.errors import InputError
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.reduction.epoch.unknowns import APPROXIMATE, build_network
+from catseye.reduction.epoch.prior_names import APPROXIMATE
+from catseye.reduction.epoch.unknowns import build_network
 
 
 def prior(network, name):

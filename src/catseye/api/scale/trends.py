@@ -55,8 +55,14 @@ class TrendsResult(Result):
         listed = ", ".join(body.name for body in self.found.bodies) or "none"
         raise InputError(f"body {name!r} has no model (expected one of {listed})")
 
+    @with_units
     def predict(
-        self, body: str, *, elevation_deg: float, temperature_c: float, mjd: float
+        self,
+        body: str,
+        *,
+        elevation_deg: Annotated[Any, In("deg", one=True)],
+        temperature_c: Annotated[Any, In("deg_C", one=True)],
+        mjd: Annotated[Any, In("mjd", one=True)],
     ) -> tuple[np.ndarray, np.ndarray]:
         """Places (n, 3) m of a body's points in its frame, with covariance (n, 3, 3) m², by its model.
 

@@ -10,6 +10,7 @@ from catseye.estimation.observations.kinds import ObservationGroup
 
 UNSEEN = 1e-6  # share of a pattern left by the parameters, below which it is rounding
 BATCH = 32  # observations per batch
+WIDE_BATCH = 250  # the same where all are required
 
 
 class Influence:
@@ -38,6 +39,7 @@ class Influence:
         self.active = np.concatenate([f.active for f in fits])
         self.sigma = np.concatenate([f.sigma for f in fits])
         self.visible = np.concatenate([(NONCENTRALITY / f.detectable_error) ** 2 for f in fits])
+        self.weight = np.concatenate([r.own_weight() for r in self._rows])  # diagonal of P
         self.weighed = np.concatenate([f.standardised for f in fits]) * np.sqrt(self.visible)
         self._least = 1e-9 * self.visible
         self._columns: dict[int, np.ndarray] = {}
@@ -58,21 +60,25 @@ class Influence:
         """Detectable error of every row, as in `GroupFit`."""
         return NONCENTRALITY / np.sqrt(self.visible)
 
-    def leave_out(self, k: int, likely: np.ndarray) -> None:
+    def leave_out(self, k: int, likely: np.ndarray) -> tuple[np.ndarray, float]:
         """Leave out one more row.
 
         k        row
         likely   rows that may be left out next; cheaper in one batch
+
+        Returns its column (rows,) of P_v and its P v, each over the root of the column's diagonal.
         """
         if k not in self._columns:
             batch = [k, *(int(j) for j in likely if j != k and j not in self._columns)][:BATCH]
             self._columns.update(zip(batch, self._of(np.array(batch)), strict=True))
         column = self._columns.pop(k) - self._out[:, k] @ self._out
         root = np.sqrt(max(column[k], self._least[k]))
+        weighed = float(self.weighed[k] / root)
         self.weighed = self.weighed - column * (self.weighed[k] / root**2)
         self.visible = np.maximum(self.visible - (column / root) ** 2, self._least)
         self.active[k] = False
         self._out = np.concatenate([self._out, (column / root)[None]])
+        return column / root, weighed
 
     def errors_of(self, patterns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Error of each of k patterns (rows, k) in the observations: estimates (k,) and their u (k,).
@@ -80,20 +86,25 @@ class Influence:
         Each is estimated by itself, from the solution before any row is left out; patterns are 0 in inactive rows.
         A pattern that the parameters absorb completely has infinite u.
         """
-        information = np.sum(patterns * self._through(patterns).T, axis=0)
+        information = np.sum(patterns * self.through(patterns).T, axis=0)
         usual = np.sum(patterns**2 * self.visible[:, None], axis=0)
         estimable = information > UNSEEN * np.maximum(usual, 1e-300)
         information = np.where(estimable, information, 1.0)
         estimate = np.where(estimable, patterns.T @ self.weighed / information, 0.0)
         return estimate, np.where(estimable, information**-0.5, np.inf)
 
+    def between(self, rows: np.ndarray) -> np.ndarray:
+        """P_v (k, k) between some rows, of the solution before any row is left out."""
+        batches = np.array_split(rows, max(1, len(rows) // WIDE_BATCH))
+        return np.concatenate([self._of(batch)[:, rows] for batch in batches])
+
     def _of(self, batch: np.ndarray) -> np.ndarray:
         """Columns of P_v of the original solution, one per row."""
         unit = np.zeros((int(self.first[-1]), len(batch)))
         unit[batch, np.arange(len(batch))] = 1.0
-        return self._through(unit)
+        return self.through(unit)
 
-    def _through(self, vectors: np.ndarray) -> np.ndarray:
+    def through(self, vectors: np.ndarray) -> np.ndarray:
         """P_v times vectors (rows, k), one product per row."""
         unit, right = [], np.zeros((len(self._q.diagonal()), vectors.shape[1]))
         for rows, design, low, high in zip(self._rows, self._designs, self.first, self.first[1:], strict=False):

@@ -1,6 +1,6 @@
 """Outlier search: a robust start, the smallest conflict of each point, then removal by test."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -26,6 +26,7 @@ from catseye.estimation.least_squares.conflict import (
     touched,
 )
 from catseye.estimation.least_squares.influence import Influence
+from catseye.estimation.least_squares.patterns import Patterns, PatternTests
 from catseye.estimation.least_squares.status import AdjustmentOutcome, Status
 from catseye.estimation.observations.kinds import ObservationGroup
 
@@ -52,6 +53,10 @@ class OutlierSearch:
                one good observation in 2000
     rounds     cap of removal rounds; if they do not end, the status says so
     shared     what the observations of the first groups share, where that is parameters
+    rivals     explanations of a misfit other than wrong observations: function of groups and solution, see `Patterns`;
+               where one is better than leaving out the worst observation, its rows are left out instead, and where it
+               has none the search ends
+    doubtful   names of groups that may be wrong though not left out: the robust start weighs them by their residuals
     settled    columns of parameters that are known well beside a point's: what depends on them and the point alone is
                known of the point
     """
@@ -62,6 +67,8 @@ class OutlierSearch:
     rounds: int = 100
     shared: Sequence[SharedErrors | None] = ()
     settled: Sequence[int] = ()
+    rivals: Callable[[Sequence[ObservationGroup], LeastSquaresSolution], Patterns] | None = None
+    doubtful: Collection[str] = ()
 
 
 TESTS_ALONE = OutlierSearch()
@@ -102,7 +109,10 @@ def adjust_robustly(
     careful = None  # what to try instead, should a selection leave too little to hold every parameter
     if active is None:
         careful = [np.ones(len(g.observed), dtype=bool) for g in groups]
-        solution = _reweighted(x0, groups, removable, free, names, border)
+        yielding = [
+            np.full(len(may), g.name in outliers.doubtful) | may for g, may in zip(groups, removable, strict=True)
+        ]
+        solution = _reweighted(x0, groups, yielding, free, names, border)
         whole = total_residuals(solution.fits, solution.x, outliers.shared)
         large = [may & (np.abs(v) > SUSPECT * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
         active = [~may | (np.abs(v) < WRONG * sigma) for (v, sigma), may in zip(whole, removable, strict=True)]
@@ -120,17 +130,19 @@ def adjust_robustly(
             active, careful = careful, None
             continue
         x, careful = solution.x, None
-        left = _without_worst(solution, groups, removable, outliers.critical)
+        left, beaten = _without_worst(solution, groups, removable, outliers)
         if left is not None:
             active = left
             continue
+        if beaten:
+            return solution
         tests = [
             np.where(may & _checked(f), np.abs(f.standardised), 0.0)
             for f, may in zip(solution.fits, removable, strict=True)
         ]
         back = [
-            ~a & (t < BACK * outliers.critical) & (n < MOST_RETURNS)
-            for t, a, n in zip(tests, active, returns, strict=True)
+            may & ~a & (t < BACK * outliers.critical) & (n < MOST_RETURNS)
+            for may, t, a, n in zip(removable, tests, active, returns, strict=True)
         ]
         if not any(b.any() for b in back):
             return _without_undecided(solution, groups, removable, outliers, free, names, solver)
@@ -145,23 +157,35 @@ def _without_worst(
     solution: LeastSquaresSolution,
     groups: Sequence[ObservationGroup],
     removable: Sequence[np.ndarray],
-    critical: float,
-) -> list[np.ndarray] | None:
+    outliers: OutlierSearch,
+) -> tuple[list[np.ndarray] | None, bool]:
     """The selection without the worst, the worst of the rest, and so on; None where nothing is worse than the limit.
 
-    One at a time: neighbours at a point with few checks look wrong together.
+    One at a time: neighbours at a point with few checks look wrong together. Second True where a rival explanation
+    stopped the search.
     """
     may = np.concatenate([may & f.active & _checked(f) for f, may in zip(solution.fits, removable, strict=True)])
-    if not np.any(may & (np.concatenate([np.abs(f.standardised) for f in solution.fits]) > critical)):
-        return None
+    if not np.any(may & (np.concatenate([np.abs(f.standardised) for f in solution.fits]) > outliers.critical)):
+        return None, False
     may = np.concatenate([m & f.active for f, m in zip(solution.fits, removable, strict=True)])
     tests = Influence(groups, solution)
+    rivals = None if outliers.rivals is None else PatternTests(tests, outliers.rivals(groups, solution))
     while True:
         w = np.where(may & tests.active & (tests.detectable < CHECKED * tests.sigma), np.abs(tests.standardised), 0.0)
         worst = int(np.argmax(w))
-        if w[worst] <= critical or tests.left_out >= MOST_AT_ONCE:
-            return [a.copy() for a in np.split(tests.active, tests.first[1:-1])]
-        tests.leave_out(worst, np.argsort(-w)[: np.count_nonzero(w > critical)])
+        out, beaten = [worst], False
+        if w[worst] > outliers.critical and rivals is not None:
+            rival, score = rivals.best
+            if score > w[worst] ** 2:
+                out = rivals.patterns.rows[rival].tolist()
+                beaten = not out
+        if beaten or w[worst] <= outliers.critical or tests.left_out >= MOST_AT_ONCE:
+            left = [a.copy() for a in np.split(tests.active, tests.first[1:-1])] if tests.left_out else None
+            return left, beaten
+        for row in out:
+            step = tests.leave_out(row, np.argsort(-w)[: np.count_nonzero(w > outliers.critical)])
+            if rivals is not None:
+                rivals.add(*step)
 
 
 def _checked(fit: GroupFit) -> np.ndarray:

@@ -10,7 +10,11 @@ WIDE = 4.5  # standard uncertainties on either side in the histogram
 GROUPS = (
     ("the samples", SERIES[0], ("noise", "amplitude", "steps")),
     ("the electronics", SERIES[1], ("reference", "references", "walk")),
-    ("the head", SERIES[3], ("leakage", "d0", "axes", "coupling", "cyclic", "frequency")),
+    (
+        "the head",
+        SERIES[3],
+        ("leakage", "d0", "axes", "coupling", "cyclic", "second", "feedback", "image", "frequency"),
+    ),
     (
         "the air",
         SERIES[2],

@@ -6,7 +6,10 @@ import numpy as np
 from matplotlib.collections import EllipseCollection, LineCollection
 
 from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY
+from catseye.gateways.detection.night_harmonics import harmonics_figure
+from catseye.gateways.epoch.record_figure import records_figure
 from catseye.gateways.epoch.tables import kinds_of
+from catseye.gateways.epoch.third_order_figure import third_order_figure
 from catseye.gateways.writers.drawing import BAD, FAINT, GRID, INK, SERIES, Figure, nice, styled
 from catseye.reduction.epoch.epoch import Reduction
 
@@ -31,8 +34,11 @@ def figures(reduction: Reduction) -> dict[str, Figure]:
         drawn = {
             "plan": _plan(reduction),
             "elevation": _elevation(reduction),
+            "structure": third_order_figure(reduction, COLOURS),
             "feed_arm": _feed_arm(reduction),
+            "records": records_figure(reduction),
             "residuals": _residuals(reduction),
+            "harmonics": harmonics_figure(reduction),
             "zeros": _zeros(reduction),
             "refractivity": _refractivity(reduction),
             "weather": _weather(reduction),
@@ -283,7 +289,8 @@ def _refractivity(reduction: Reduction) -> Figure | None:
     used = ranges.used
     index = {name: row for row, name in enumerate(reduction.coordinates.points)}
     z = reduction.coordinates.x[:, 2]
-    height = np.array([0.5 * (z[index[r]] + z[index[t]]) for r, t in zip(ranges.ranger, ranges.target, strict=True)])
+    ends = zip(ranges.ranger, ranges.target, used, strict=True)
+    height = np.array([0.5 * (z[index[r]] + z[index[t]]) if on else np.nan for r, t, on in ends])
     minutes = _minutes(reduction, shots.mjd_utc[ranges.shot])
     dots = ax.scatter(
         minutes[used], ranges.refractivity[used] / PPM, s=9, c=height[used], cmap="viridis", lw=0, alpha=0.9,

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from catseye.constants import PPM
+from catseye.gateways.epoch.record_tests import record_objects
+from catseye.gateways.epoch.third_order import third_order_object
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.output import FORMAT
 from catseye.records.files.covariance_file import KEY
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from catseye.records.night.campaign import Campaign
     from catseye.reduction.air.group_index import BenchmarkSeries
     from catseye.reduction.epoch.epoch import Reduction
+    from catseye.reduction.site.plausible.record import ImplausibleRecord
 
 MOST_INSIDE = 500  # most points whose full covariance is written as text: some 40 MB
 COVARIANCE = "covariance.fits"
@@ -29,7 +32,14 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
     for row, name in enumerate(coordinates.points):
         x, y, z = coordinates.x[row]
         covariance = coordinates.joint.blocks[row]
-        points[name] = {"x": x, "y": y, "z": z, "covariance": covariance, "shots": coordinates.shots[row]}
+        points[name] = {
+            "x": x,
+            "y": y,
+            "z": z,
+            "covariance": covariance,
+            "shots": coordinates.shots[row],
+            "lines": coordinates.lines[row],
+        }
     total, used, rejected = len(reduction.status), reduction.status.count("used"), len(reduction.rejected)
     return {
         "verdict": reduction.verdict.to_object(),
@@ -48,6 +58,19 @@ def reduction_object(reduction: "Reduction") -> dict[str, Any]:
         "ranger_zeros": {name: {"zero": zero, "u_zero": u} for name, (zero, u) in coordinates.zeros.items()},
         "head_effects": {name: {"value": value, "u": u} for name, (value, u) in coordinates.heads.items()},
         "air": estimated_air(reduction),
+        **record_objects(coordinates),
+        "distorted": reduction.campaign.shots.shot[reduction.phases.distorted],
+        "implausible": [_implausible_object(record) for record in reduction.implausible],
+        **({} if reduction.third_order is None else {"structure": third_order_object(reduction.third_order)}),
+    }
+
+
+def _implausible_object(record: "ImplausibleRecord") -> dict[str, Any]:
+    return {
+        "text": record.text,
+        "where": record.where,
+        "quantity": record.quantity,
+        "owners": list(record.owners),
     }
 
 

@@ -7,7 +7,10 @@ import numpy as np
 
 from catseye.aliases import Progress
 from catseye.constants import ARCSECOND, MILLIMETRE
+from catseye.gateways.detection.night_harmonics import harmonics_chart, shots_with_harmonics
 from catseye.gateways.epoch.objects import matrix_file
+from catseye.gateways.epoch.record_section import checks_section, records_section, scatter_blocks
+from catseye.gateways.epoch.record_tests import listed_tests, worst_of_all
 from catseye.gateways.epoch.report_air import air_section
 from catseye.gateways.epoch.report_charts import (
     dish_chart,
@@ -17,6 +20,7 @@ from catseye.gateways.epoch.report_charts import (
 )
 from catseye.gateways.epoch.summary import feed_arm_rows, passages, pointing
 from catseye.gateways.epoch.tables import PointRows, PrismRows, kinds_of
+from catseye.gateways.epoch.third_order import third_order_sections
 from catseye.gateways.epoch.ways import dish_estimates
 from catseye.gateways.writers.passage import Passage
 from catseye.gateways.writers.report import (
@@ -35,6 +39,7 @@ from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.reason import ShotStatus
 from catseye.reduction.epoch.surface import UNOBSERVED
 from catseye.reduction.epoch.verdict import factor_spread
+from catseye.signal.detection.harmonics import DISTORTED
 
 
 def reduction_report(reduction: Reduction, when: datetime, progress: Progress | None = None) -> ResultReport:
@@ -55,11 +60,14 @@ def reduction_report(reduction: Reduction, when: datetime, progress: Progress | 
         sections=[
             _feed_arm(reduction),
             _dish(reduction),
+            *third_order_sections(reduction),
             _network(reduction),
+            records_section(reduction),
             _residuals(reduction),
             _rejected(reduction),
             _rangers(reduction),
             air_section(reduction),
+            checks_section(reduction),
             _points(reduction),
             _shots(reduction),
             _provenance(reduction, when),
@@ -90,9 +98,25 @@ def _cards(reduction: Reduction) -> list[Card]:
     mean = "group, mean over the used paths"
     return [
         *cards,
+        *_record_cards(reduction),
         Card("Variance factor", _number(coordinates.variance_factor, 2), expected),
         Card("Refractivity", f"{_number(coordinates.refractivity_ppm, 2)} ppm", mean),
     ]
+
+
+def _record_cards(reduction: Reduction) -> list[Card]:
+    """Contradicted records and unchecked points."""
+    coordinates, cards = reduction.coordinates, []
+    worst = worst_of_all(listed_tests(coordinates))
+    if worst is not None:
+        count = len(coordinates.contradictions)
+        remark = f"between records and ranges; the largest |w| of a record is {abs(worst.w):.1f}"
+        cards.append(Card("Contradictions", f"{count}" if count else "none", remark))
+    if coordinates.unchecked:
+        cards.append(
+            Card("Unchecked points", f"{len(coordinates.unchecked)}", "an error of one line could move them unseen")
+        )
+    return cards
 
 
 def _feed_arm(reduction: Reduction) -> ReportSection:
@@ -204,7 +228,7 @@ def _residuals(reduction: Reduction) -> ReportSection:
         f"above {limit:g} is rejected."
     )
     charts = [ChartBlock(key, chart, caption) for key, (chart, caption) in residual_charts(reduction).items()]
-    return ReportSection("residuals", "Residuals", [Text(lead), *charts])
+    return ReportSection("residuals", "Residuals", [Text(lead), *scatter_blocks(reduction), *charts])
 
 
 def _rejected(reduction: Reduction) -> ReportSection:
@@ -270,8 +294,23 @@ def _rangers(reduction: Reduction) -> ReportSection:
             Text("Each ranger's zero is estimated with the coordinates; its laboratory calibration is the prior."),
             ChartBlock("zeros", zeros_chart(reduction), "Corrections to the rangers' zeros, with their u."),
             TableBlock("rangers", table),
+            *_harmonics(reduction),
         ],
     )
+
+
+def _harmonics(reduction: Reduction) -> list[Block]:
+    chart = harmonics_chart(reduction)
+    count = int(np.sum(reduction.phases.distorted))
+    caption = (
+        f"Distortion of each shot's samples; {count or 'no'} {'shot' if count == 1 else 'shots'} beyond the limit of "
+        f"{100 * DISTORTED:g} % by four standard uncertainties. These harmonics turn no phase of synchronous detection."
+    )
+    if chart is None:
+        return []
+    if len(chart.names) < len(shots_with_harmonics(reduction)):
+        caption += f" The {len(chart.names)} largest are drawn; ranges.csv has those of every shot."
+    return [ChartBlock("harmonics", chart, caption)]
 
 
 def _points(reduction: Reduction) -> ReportSection:
@@ -283,6 +322,8 @@ def _points(reduction: Reduction) -> ReportSection:
             *(number(axis, axis, coordinates.x[:, k], "m", 5) for k, axis in enumerate("xyz")),
             *(uncertainty(f"u_{axis}", f"u {axis}", rows.u[:, k], "mm", 3) for k, axis in enumerate("xyz")),
             number("shots", "shots", coordinates.shots, digits=0),
+            number("lines", "lines", coordinates.lines, digits=0),
+            text("status", "status", rows.status),
         ),
         "point",
     )

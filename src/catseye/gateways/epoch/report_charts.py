@@ -6,6 +6,7 @@ from catseye.constants import DEGREE, MILLIMETRE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.gateways.epoch.tables import kinds_of
 from catseye.gateways.writers.report_parts import Axis, Beams, Chart, Coloured, Scene, categories
 from catseye.reduction.epoch.epoch import Reduction
+from catseye.reduction.epoch.range_shots import RangeShots
 from catseye.reduction.epoch.surface import DishFit
 
 BEYOND = 1.35  # times the largest residual of a used shot: limit of the rejected shots in a chart
@@ -81,14 +82,14 @@ def residual_charts(reduction: Reduction) -> dict[str, tuple[Chart, str]]:
         return {}
     used = np.flatnonzero(ranges.used)
     number, w = shots.shot[ranges.shot], ranges.standardised
-    ranger, target = [ranges.ranger[k] for k in used], [ranges.target[k] for k in used]
+    ranger, target = _used_ends(ranges)
     standardised = Axis("w", "", w[used], digits=3)
     names, limits = number[used].tolist(), (-limit, limit)
 
     def by(x: Axis) -> Chart:
         return Chart("scatter", x, standardised, names=names, limits=limits)
 
-    elevation = Axis("elevation of the path", "°", _elevation(reduction)[used] / DEGREE, digits=2)
+    elevation = Axis("elevation of the path", "°", _elevation(reduction) / DEGREE, digits=2)
     return {
         "residuals-by-time": _in_time(reduction),
         "w-by-ranger": (by(categories("ranger", ranger)), "Standardised residuals of the used ranges by ranger."),
@@ -128,10 +129,17 @@ def _in_time(reduction: Reduction) -> tuple[Chart, str]:
 
 
 def _elevation(reduction: Reduction) -> np.ndarray:
-    """Elevation of each range's path at its ranger, rad."""
-    coordinates, ranges = reduction.coordinates, reduction.coordinates.ranges
-    path = coordinates.x[coordinates.rows(ranges.target)] - coordinates.x[coordinates.rows(ranges.ranger)]
+    """Elevation of each used range's path at its ranger, rad."""
+    coordinates = reduction.coordinates
+    ranger, target = (coordinates.x[coordinates.rows(names)] for names in _used_ends(coordinates.ranges))
+    path = target - ranger
     return np.arctan2(path[:, 2], np.hypot(path[:, 0], path[:, 1]))
+
+
+def _used_ends(ranges: RangeShots) -> tuple[list[str], list[str]]:
+    """Rangers and targets of the used ranges."""
+    used = np.flatnonzero(ranges.used)
+    return [ranges.ranger[k] for k in used], [ranges.target[k] for k in used]
 
 
 def _minutes(reduction: Reduction, mjd: np.ndarray) -> np.ndarray:
@@ -154,8 +162,7 @@ def refractivity_chart(reduction: Reduction) -> Chart | None:
     used = np.flatnonzero(ranges.used)
     if not len(used):
         return None
-    z = coordinates.x[:, 2]
-    height = 0.5 * (z[coordinates.rows(ranges.ranger)] + z[coordinates.rows(ranges.target)])[used]
+    height = np.mean([coordinates.x[coordinates.rows(names), 2] for names in _used_ends(ranges)], axis=0)
     height = height - float(np.median(height))
     shots = reduction.campaign.shots
     return Chart(

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from catseye.gateways.epoch.objects import COVARIANCE, matrix_file
+from catseye.gateways.epoch.record_tests import CONTRADICTIONS, RECORDS, explanation_rows, listed_tests
 from catseye.gateways.epoch.tables import COORDINATES, RANGES, SURFACE, PointRows, PrismRows, ShotRows
 from catseye.gateways.writers.objects import versions
 from catseye.gateways.writers.samplers_fits import (
@@ -17,6 +18,7 @@ from catseye.gateways.writers.samplers_fits import (
     sampler_tables,
 )
 from catseye.geometry.sky.time_tag import MJD_EPOCH
+from catseye.reduction.epoch.contradictions.contradiction import ClassScatter, GroupTest
 from catseye.reduction.epoch.epoch import Reduction
 
 RESULTS = "results.fits"
@@ -24,7 +26,7 @@ GROUND = "ground: x east, y north, z up"
 
 
 def results_fits(reduction: Reduction) -> bytes:
-    """FITS file of a reduction: POINTS, RANGES, ZEROS, PROVENANCE; SURFACE, POSE and COVARIANCE where there are such.
+    """FITS file of a reduction, a table for each subject; those without a row are left out.
 
     It holds no time of writing, so that the same inputs, settings and versions give the same bytes.
     """
@@ -33,6 +35,7 @@ def results_fits(reduction: Reduction) -> bytes:
         of_table("RANGES", RANGES, ShotRows(reduction)),
         *_surface(reduction),
         _zeros(reduction),
+        *_records(reduction),
         *_covariance(reduction),
         _provenance(reduction),
     ]
@@ -122,6 +125,47 @@ def _zeros(reduction: Reduction) -> SamplerTable:
         "U_ZERO": SamplerColumn("m", values[:, 1], "standard uncertainty"),
     }
     return SamplerTable("ZEROS", columns, comment="zeros of the rangers, as estimated")
+
+
+def _records(reduction: Reduction) -> list[SamplerTable]:
+    """Tests of records and their groups, contradictions, scatter of classes, unmeasured targets: those with rows."""
+    coordinates = reduction.coordinates
+    explanations = explanation_rows(coordinates.contradictions)
+    tables = []
+    if coordinates.records:
+        tables.append(of_table("RECORDS", RECORDS, listed_tests(coordinates)))
+    if coordinates.groups:
+        tables.append(_groups(coordinates.groups))
+    if explanations:
+        tables.append(of_table("CONTRADICTIONS", CONTRADICTIONS, explanations))
+    if coordinates.scatter:
+        tables.append(_scatter(coordinates.scatter))
+    if coordinates.unmeasured:
+        columns = {"POINT": SamplerColumn("", np.array([ascii_text(name) for name in coordinates.unmeasured]))}
+        tables.append(
+            SamplerTable("UNMEASURED", columns, comment="targets and rangers without a usable shot, not in POINTS")
+        )
+    return tables
+
+
+def _groups(groups: tuple[GroupTest, ...]) -> SamplerTable:
+    columns = {
+        "GROUP": SamplerColumn("", np.array([str(test.group) for test in groups])),
+        "CHI2": SamplerColumn("", np.array([test.statistic for test in groups]), "chi squared of the group's errors"),
+        "DOF": SamplerColumn("", np.array([test.degrees for test in groups]), "degrees of freedom"),
+        "PROBABILITY": SamplerColumn("", np.array([test.probability for test in groups]), "of as much by chance"),
+    }
+    return SamplerTable("GROUPS", columns, comment="tests of all records of a group together")
+
+
+def _scatter(scatter: tuple[ClassScatter, ...]) -> SamplerTable:
+    columns = {
+        "CLASS": SamplerColumn("", np.array([ascii_text(entry.name) for entry in scatter])),
+        "SHOTS": SamplerColumn("", np.array([entry.shots for entry in scatter]), "used"),
+        "VARFACT": SamplerColumn("", np.array([entry.factor for entry in scatter]), "variance factor, expected 1"),
+        "SWAY": SamplerColumn("m", np.array([entry.sway_m for entry in scatter]), "from shot to shot, included in u"),
+    }
+    return SamplerTable("SCATTER", columns, comment="scatter of the shots by class of points, against their claim")
 
 
 def _covariance(reduction: Reduction) -> list[SamplerTable]:

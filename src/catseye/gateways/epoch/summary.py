@@ -5,7 +5,9 @@ from collections import Counter
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE, SECONDS_PER_DAY
+from catseye.gateways.epoch.record_tests import checks_sentences, records_sentence
 from catseye.gateways.epoch.tables import kinds_of
+from catseye.gateways.epoch.third_order import third_order_passage
 from catseye.gateways.writers.passage import Passage
 from catseye.records.night.campaign import REFERENCE
 from catseye.reduction.epoch.epoch import Reduction
@@ -25,14 +27,17 @@ MEANING = {
 
 
 def passages(reduction: Reduction) -> list[Passage]:
-    """Passages on the night, shots, feed arm, dish, air and reliability."""
+    """Passages on the night, shots, feed arm, dish, air, records and reliability."""
+    records = records_sentence(reduction.coordinates)
     return [
         Passage("The night", _night(reduction)),
         Passage("The shots", _shots(reduction)),
         Passage("The feed arm", _feed_arm(reduction)),
         Passage("The dish", _dish(reduction)),
+        *([] if reduction.third_order is None else [third_order_passage(reduction.third_order)]),
         Passage("The air", _air(reduction)),
-        Passage("Reliability", _trust(reduction)),
+        *([Passage("The records", records)] if records else []),
+        Passage("Reliability", " ".join([_trust(reduction), *checks_sentences(reduction.coordinates)])),
         *([Passage("Notes", "; ".join(reduction.notes) + ".")] if reduction.notes else []),
     ]
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from catseye.constants import DEGREE, MILLIMETRE, PPM, SPEED_OF_LIGHT, TWO_PI
+from catseye.constants import DEGREE, MILLIMETRE, PPM, TWO_PI
 from catseye.gateways.writers.columns import Column, Table
 from catseye.reduction.epoch.epoch import Reduction
 from catseye.reduction.epoch.range_shots import RangeShots
@@ -30,7 +30,7 @@ class ShotRows:
     @cached_property
     def vacuum(self) -> np.ndarray:
         """Lengths that the adjusted phases represent in vacuum, m."""
-        half = 0.5 * SPEED_OF_LIGHT / self.reduction.campaign.site.ranging.modulation_hz
+        half = self.reduction.campaign.half_wavelengths(self.ranges.shot)
         return unwrapped_length(self.ranges.cycles, self.ranges.phase, half)
 
     @property
@@ -96,6 +96,26 @@ RANGES = Table[ShotRows](
             "standard uncertainty from the samples' noise",
             lambda r: r.reduction.phases.u_phase,
             ".7f",
+        ),
+        Column(
+            "harmonic_2",
+            "",
+            "second harmonic of the samples over the return",
+            lambda r: r.reduction.phases.relative_harmonics[:, 0],
+            ".5f",
+        ),
+        Column(
+            "harmonic_3",
+            "",
+            "third harmonic of the samples over the return",
+            lambda r: r.reduction.phases.relative_harmonics[:, 1],
+            ".5f",
+        ),
+        Column(
+            "distorted",
+            "",
+            "`distorted` where one of them exceeds 2 % by four standard uncertainties; it rejects no shot",
+            lambda r: np.where(r.reduction.phases.distorted, "distorted", "").tolist(),
         ),
         _ranged(
             "electronics_rad",
@@ -191,6 +211,11 @@ class PointRows:
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
     @property
+    def status(self) -> list[str]:
+        unchecked = set(self.reduction.coordinates.unchecked)
+        return ["unchecked" if name in unchecked else "checked" for name in self.reduction.coordinates.points]
+
+    @property
     def moved(self) -> np.ndarray:
         """Distances from the approximate places, m."""
         return np.linalg.norm(self.reduction.coordinates.x - self.reduction.coordinates.start, axis=1)
@@ -223,6 +248,13 @@ COORDINATES = Table[PointRows](
             "distance from the approximate place in the campaign's files",
             lambda r: r.moved / MILLIMETRE,
             ".4f",
+        ),
+        Column("lines", "", "number of independent lines to or from it", lambda r: r.reduction.coordinates.lines),
+        Column(
+            "status",
+            "",
+            "`checked`, or `unchecked` where an error of one line could move it unseen",
+            lambda r: r.status,
         ),
     ),
 )

@@ -1,12 +1,11 @@
 """Plausibility of explanations, and allowances for misfit that remains.
 
-An adjustment drops the prior of a thermometer, a zero or a sounded line where the ranges contradict it. That
-explains the misfit, and the explanation must be possible: an instrument that can be so wrong, ranges that determine
-it better than its record, air that exists. Where it is not, the prior stays, and the residuals' pattern decides
-what is allowed for: a family of `self_check`, or the air between the stations.
+Where the ranges contradict a record, `record_tests` says by how much each possible explanation errs, and the
+adjustment is repeated with that allowed for. Where no record explains a misfit, the residuals' pattern decides what is
+allowed for: a family of `self_check`, or the air between the stations.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -15,6 +14,9 @@ import numpy as np
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.covariance import Widened
 from catseye.reduction.epoch.air.field import AirField
+from catseye.reduction.epoch.contradictions.contradiction import Contradiction, RecordGroup
+from catseye.reduction.epoch.contradictions.hypotheses import RecordKey
+from catseye.reduction.epoch.motion.scatter import sway_text
 from catseye.reduction.epoch.parameter import BEND, Parameter, ParameterKind
 from catseye.reduction.epoch.self_check import Family, FamilyCheck
 
@@ -24,6 +26,7 @@ STEEPEST_UP, STEEPEST_DOWN = 0.025, -0.02  # °C/m between the stations: of most
 USUAL_GRADIENT = -0.0065  # °C/m, of the standard atmosphere
 BEND_OF_GRADIENT = 0.1  # share of a strong inversion's temperature by which its profile may bend
 UNSURE = 0.7  # of a thermometer's prior u that remains: the ranges do not determine it
+STRANGE_C = 4.0  # between two stations beyond the usual lapse: rather a wrong thermometer than an inversion
 UNPLACED = 80.0  # m, each of east and north, from the middle of the site to a station without a place
 DOUBTED_C = 2.5  # prior u of a thermometer's offset from which it is doubted, before it is refuted
 
@@ -33,10 +36,12 @@ class AllowanceReason(NamedTuple):
 
     text      a sentence
     subject   parameter that it judges to be off; None for one that judges none
+    doubtful  False where the uncertainties include all that it may mean
     """
 
     text: str
     subject: Parameter | None = None
+    doubtful: bool = True
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,13 @@ class Allowance:
     held           priors that are never dropped
     thermometers   station: °C, standard uncertainty of its offset, doubts included
     profile        the same for the profile's parameter; 0: by the settings
+    errors         records that may err by more than they state: SI standard uncertainty of each of their parts
+    contradictions   between records and ranges, which these errors explain
+    refused        records that cannot be what is wrong: with their errors allowed for, nothing settled
+    searched       no contradiction explains the wrong shots that remain: they are left out whatever else would explain
+                   them
     families       of `self_check`: standard deviation of the error that each bin's shots share, unit of the family
+    sway           body, of `scatter.SWAYING`: m, standard deviation of a displacement drawn anew for each shot
     reasons        of the allowances
     """
 
@@ -54,12 +65,22 @@ class Allowance:
     thermometers: Mapping[str, float] = field(default_factory=dict)
     profile: float = 0.0
     families: Mapping[Family, float] = field(default_factory=dict)
+    errors: Mapping[RecordKey, tuple[float, ...]] = field(default_factory=dict)
+    contradictions: tuple[Contradiction, ...] = ()
+    refused: frozenset[RecordKey] = frozenset()
+    searched: bool = False
+    sway: Mapping[str, float] = field(default_factory=dict)
     reasons: tuple[AllowanceReason, ...] = ()
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """Reasons, a sentence each."""
-        return tuple(reason.text for reason in self.reasons)
+        """Sways and reasons, a sentence each."""
+        return (*(sway_text(body, size) for body, size in self.sway.items()), *(reason.text for reason in self.reasons))
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons against a good verdict."""
+        return tuple(reason.text for reason in self.reasons if reason.doubtful)
 
     def same(self, allowance: "Allowance") -> bool:
         """True if no further adjustment is needed.
@@ -68,9 +89,23 @@ class Allowance:
         """
         return (
             self.held == allowance.held
+            and self.errors.keys() == allowance.errors.keys()
+            and self.refused == allowance.refused
+            and self.searched == allowance.searched
             and self.families.keys() == allowance.families.keys()
             and all(u <= 1.1 * allowance.thermometers.get(n, 0.0) for n, u in self._loose.items())
         )
+
+    @property
+    def refuted(self) -> tuple[Parameter, ...]:
+        """Parameters named wrong: thermometers, zeros, sounded lines."""
+        kinds = {
+            RecordGroup.THERMOMETERS: ParameterKind.THERMOMETER,
+            RecordGroup.ZEROS: ParameterKind.ZERO,
+            RecordGroup.SOUND: ParameterKind.SOUND,
+        }
+        named = [c.named for c in self.contradictions if c.named is not None]
+        return tuple(Parameter(kinds[n.group], n.of) for n in named if n.group in kinds and n.of)
 
     @property
     def _loose(self) -> dict[str, float]:
@@ -101,6 +136,42 @@ class Allowance:
             sigmas[i] = max(sigmas[i], self._loose.get(station, 0.0))
         return sigmas
 
+    def explained(
+        self, contradictions: Sequence[Contradiction], errors: Mapping[RecordKey, tuple[float, ...]]
+    ) -> "Allowance":
+        """Allowance for more contradictions, and the errors that explain them.
+
+        What was allowed for while these were unknown is judged anew.
+        """
+        return replace(
+            self,
+            errors={**self.errors, **errors},
+            contradictions=(*self.contradictions, *contradictions),
+            thermometers={},
+            profile=0.0,
+            families={},
+            reasons=(),
+        )
+
+    def refusing(self, keys: Collection[RecordKey]) -> "Allowance":
+        """Allowance that keeps some records: with their errors allowed for, an adjustment did not settle."""
+        text = "the ranges contradict records, but do not settle with the likeliest of them wrong"
+        reasons = (*self.reasons, AllowanceReason(text))
+        return replace(self, refused=self.refused | set(keys), searched=True, reasons=reasons)
+
+    def leaning(self, errors: Mapping[RecordKey, tuple[float, ...]], text: str) -> "Allowance":
+        """Allowance for common errors that the ranges contradict a little, as chance may."""
+        reason = AllowanceReason(f"the ranges lean to an error of {text}: the uncertainties include it", doubtful=False)
+        return replace(self, errors={**self.errors, **errors}, reasons=(*self.reasons, reason))
+
+    def acquitting(self, keys: Collection[RecordKey]) -> "Allowance":
+        """Allowance that keeps records which were named, and are right beside what was named later."""
+        remaining = tuple(
+            c for c in self.contradictions if c.named is None or RecordKey(c.named.group, c.named.of) not in keys
+        )
+        errors = {key: sigma for key, sigma in self.errors.items() if key not in keys}
+        return replace(self, errors=errors, contradictions=remaining, refused=self.refused | set(keys))
+
     def considered(self, air: AirField, solution: LeastSquaresSolution, columns: np.ndarray) -> LeastSquaresSolution:
         """Solution with a covariance that includes possible errors of the priors.
 
@@ -112,6 +183,8 @@ class Allowance:
         """
         sigmas = self.priors(air)
         doubt = np.sqrt(np.maximum(self.sigmas(air) ** 2 - sigmas**2, 0.0))
+        if any(key.group is RecordGroup.THERMOMETERS for key in self.errors):
+            doubt[: len(air.stations)] = 0.0  # their priors are wide, and the ranges determine what they can
         at = np.flatnonzero(doubt > 0.0)
         if not len(at):
             return solution
@@ -120,36 +193,6 @@ class Allowance:
 
 
 NOTHING = Allowance()
-
-
-def refused(
-    before: Allowance, dropped: Mapping[Parameter, float], air: AirField, u: Mapping[str, float], rangers: int
-) -> Allowance:
-    """Allowance that keeps the priors whose removal is implausible.
-
-    dropped   parameters whose priors the adjustment left out, and their estimates
-    u         station: °C, of its offset by the ranges
-    """
-    retained, reasons = set(before.held), list(before.reasons)
-    zeros = [p for p in dropped if p.kind is ParameterKind.ZERO]
-    if len(zeros) > max(1, MOST_ZEROS * rangers):
-        retained |= set(zeros)
-        names = ", ".join(p.of for p in zeros)
-        text = f"the misfit would need {len(zeros)} wrong zeros at once ({names}): the sheets are kept, the cause is "
-        reasons.append(AllowanceReason(text + "something else"))
-    for parameter, value in dropped.items():
-        if parameter.kind is not ParameterKind.THERMOMETER:
-            continue
-        prior = float(air.sigmas[air.stations.index(parameter.of)])
-        if abs(value) > LARGEST_OFFSET_C or u[parameter.of] > prior:
-            retained.add(parameter)
-            text = (
-                f"the misfit would need a bias of {parameter.of}'s thermometer by {value:+.1f} °C (u "
-                f"{u[parameter.of]:.1f} °C), which the ranges do not determine well enough: its record is kept, and "
-                "something else in the air departs from the model"
-            )
-            reasons.append(AllowanceReason(text))
-    return replace(before, held=frozenset(retained), reasons=tuple(reasons))
 
 
 def for_the_air(
@@ -186,8 +229,9 @@ def for_the_air(
                 np.hypot(air.sigmas[i], off)
             )  # almost refuted: its record no longer constrains it
             text = (
-                f"{station}'s thermometer is biased by {values[i]:+.2f} °C by the ranges, {off / air.sigmas[i]:.1f} of "
-                "its record's u: the uncertainties include this"
+                f"the ranges lean to a bias of {values[i]:+.2f} °C of {station}'s thermometer, "
+                f"{off / air.sigmas[i]:.1f} of its record's u, or to another scale or pressure: the uncertainties "
+                "include this"
             )
             reasons.append(AllowanceReason(text, thermometer))
     gradient = air.steepest(values)
@@ -203,7 +247,10 @@ def for_the_air(
             f"the stations differ by {gradient:+.3f} °C a metre of height: {kind}, or {blamed} is off by some "
             f"{apart:.1f} °C, which no benchmark's path decides; the uncertainties include both"
         )
-        reasons = [*(reason for reason in reasons if reason.subject != BEND), AllowanceReason(text, BEND)]
+        reasons = [
+            *(reason for reason in reasons if reason.subject != BEND),
+            AllowanceReason(text, BEND, doubtful=apart > STRANGE_C),
+        ]
     return replace(before, thermometers=thermometers, profile=profile, reasons=tuple(reasons))
 
 

@@ -21,19 +21,11 @@ from catseye.atmosphere.weather.humidity import relative_humidity_percent, vapou
 from catseye.constants import MILLIMETRE, PPM, TWO_PI
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.covariance import Widened
-from catseye.estimation.least_squares.rows import ActiveRows, variances
+from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.optics.glass import glass_named, temperature_slopes
+from catseye.reduction.epoch.prior_names import BENCHMARKS, GLASS, MONUMENTS, OFFSETS, TRIPLET_BALLS, ZEROS
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
-from catseye.reduction.epoch.unknowns import (
-    BENCHMARKS,
-    GLASS,
-    MONUMENTS,
-    OFFSETS,
-    TRIPLET_BALLS,
-    ZEROS,
-    CampaignNetwork,
-    path_ppm,
-)
+from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
 
 STEEL_PER_K = 12e-6
 U_WAVELENGTH_UM = 1e-3  # of each head: site.toml gives one for all, 0.780, to its last digit
@@ -155,8 +147,9 @@ class _Sight:
 def _of_heads(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Sight]) -> Iterator[CommonError]:
     campaign = network.campaign
     mirrors = {p.name: campaign.mirror_of(p.name) for p in parts}
-    zeros = [prior for prior in network.priors if prior.name == ZEROS]
-    bench = [np.full(len(z.observed), OF_BENCH * np.sqrt(np.mean(variances(z)))) for z in zeros]
+    stated = np.array([campaign.mirror_of(n).u_d0_mm for n in network.rangers]) * MILLIMETRE
+    u_bench = OF_BENCH * float(np.sqrt(np.mean(stated**2)))
+    bench = [np.full(len(z.observed), u_bench) for z in network.priors if z.name == ZEROS]
     yield CommonError("D0 of one bench", {}, {ZEROS: bench})
     if campaign.site.in_common.sheets_at_c is not None:
         warm = {s.name: STEEL_PER_K * (s.temperature - campaign.site.in_common.sheets_at_c) for s in sights}
@@ -193,7 +186,7 @@ def _of_glass(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Si
     prisms = [name for name in owners if places[name].normal is not None]
     for first in range(0, len(prisms), BATCH):
         batch = np.isin(owners, prisms[first : first + BATCH])
-        error = np.where(batch, np.sqrt(variances(prior)), 0.0)
+        error = np.where(batch, [places[name].u_constant for name in owners], 0.0)
         yield CommonError(f"glass of batch {first // BATCH + 1}", {}, {GLASS: [error]})
 
 

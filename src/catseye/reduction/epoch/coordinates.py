@@ -5,6 +5,7 @@ It solves for points, ranger zeros, leakage, air and prism normals together.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,29 +17,41 @@ from catseye.estimation.least_squares.adjustment import (
 )
 from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.records.night.campaign import ObservedSite
+from catseye.reduction.epoch.allowance import Allowance
 from catseye.reduction.epoch.common_errors import considered
-from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
+from catseye.reduction.epoch.contradictions.contradiction import ClassScatter, Contradiction, GroupTest, RecordTest
 from catseye.reduction.epoch.head import head_unknowns
-from catseye.reduction.epoch.notes import cycle_notes, doubts_of, loss_notes, record_notes, sound_notes, wrong_records
+from catseye.reduction.epoch.lines.cycles import Resolved, resolve_cycles, without_shots
+from catseye.reduction.epoch.lines.frequency_cycles import FrequencyCycles
+from catseye.reduction.epoch.lines.frequency_places import PlacedCampaign, placed_by_frequencies
+from catseye.reduction.epoch.lines.independence import independence_of
+from catseye.reduction.epoch.lines.line_tests import line_tests
+from catseye.reduction.epoch.lines.mistyped import with_mistyped_found
+from catseye.reduction.epoch.motion.scatter import class_scatter, shot_ends
+from catseye.reduction.epoch.notes import (
+    cycle_notes,
+    doubts_of,
+    loss_doubts,
+    loss_notes,
+    record_notes,
+    sound_notes,
+    wrong_records,
+)
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
+from catseye.reduction.epoch.prior_names import UNJUDGED
 from catseye.reduction.epoch.range_shots import RangeShots, ranges_of
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
 from catseye.reduction.epoch.reason import Reason
+from catseye.reduction.epoch.record_tests import EpochRecords, record_tests
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.settling import (
-    JUDGED,
     SettledNetwork,
-    allowed,
-    iterate_adjustment,
-    refuted_priors,
-    selection_of,
+    first_adjustment,
+    judged_network,
 )
 from catseye.reduction.epoch.strengths import ProcessStrength
 from catseye.reduction.epoch.telescope_track import motion_of
-from catseye.reduction.epoch.unknowns import (
-    UNJUDGED,
-    build_network,
-)
+from catseye.reduction.epoch.unknowns import build_network
 from catseye.reduction.site.places import RangedPoint
 
 
@@ -67,6 +80,14 @@ class AdjustedCoordinates:
     strength     of the processes in time, by the ranges
     doubts       reasons against a good verdict although all tests passed, a sentence each
     refuted      parameters whose priors the ranges contradict and are left out: thermometers, zeros, sounded lines
+    records      test of every number of every record
+    groups       test of each group of records
+    contradictions   between records and ranges, with their explanations
+    scatter      of the shots of each class of points
+    lines        (points,) independent lines to or from each point
+    unchecked    points, one of whose ranges could be wrong without showing
+    unmeasured   ranged targets without a usable shot, which are not among the points
+    frequencies  whole cycles by several modulation frequencies
     """
 
     points: tuple[str, ...]
@@ -92,6 +113,14 @@ class AdjustedCoordinates:
     doubts: tuple[str, ...] = ()
     refuted: tuple[Parameter, ...] = ()
     u_adjusted: dict[str, float] = field(default_factory=dict)
+    records: tuple[RecordTest, ...] = ()
+    groups: tuple[GroupTest, ...] = ()
+    contradictions: tuple[Contradiction, ...] = ()
+    scatter: tuple[ClassScatter, ...] = ()
+    lines: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    unchecked: tuple[str, ...] = ()
+    unmeasured: tuple[str, ...] = ()
+    frequencies: FrequencyCycles = field(default_factory=FrequencyCycles)
 
     def index(self, name: str) -> int:
         """Row of a point by its name."""
@@ -136,7 +165,8 @@ def adjust_coordinates(
     points that are typed too badly for the nearest integer.
 
     Source: [PARKER04] eq. 5.18 and 5.19 for the range, in optical metres: N c/2f - phase c/(4 pi f) =
-    n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc. The priors are the records' uncertainties.
+    n_path D - n (Pc + dPc + D0 + zero); [GOLDMAN00] eq. B.1 for dPc, section 1.1, steps 1 and
+    3 (balls, and rangers of the feed arm), appendix C (incidences). The priors are the records' uncertainties.
     """
     settled, resolved = settled_network(campaign, phases, electronics, settings=settings, progress=progress)
     return coordinates_of(settled, resolved=resolved)
@@ -151,47 +181,70 @@ def settled_network(
     progress: Progress | None = None,
 ) -> tuple[SettledNetwork, Resolved]:
     """Adjusted network with its covariance, and the cycles resolved beforehand; see `adjust_coordinates`."""
+    placed = placed_by_frequencies(campaign, phases, electronics, settings=settings, motion=motion_of(campaign))
+    resolve = partial(_resolved_network, placed, settings=settings, progress=progress)
+    first, resolved = resolve(Allowance())
+    if sway := first.network.allowance.sway:  # the cycles were searched for without it
+        first, resolved = resolve(Allowance(sway=sway))
+    first, resolved = with_mistyped_found(first, resolved, progress)
+    return judged_network(first, progress), resolved
+
+
+def _resolved_network(
+    placed: PlacedCampaign,
+    allowance: Allowance,
+    *,
+    settings: ReductionSettings,
+    progress: Progress | None,
+) -> tuple[SettledNetwork, Resolved]:
+    """Adjusted network of the shots with resolved cycles, and these."""
+    campaign, phases, electronics = placed.campaign, placed.phases, placed.electronics
     motion = motion_of(campaign)
-    network = build_network(campaign, phases, electronics, settings=settings, motion=motion)
-    resolved = resolve_cycles(network, progress)
+    network = build_network(campaign, phases, electronics, settings=settings, motion=motion, allowance=allowance)
+    resolved = resolve_cycles(network, progress, starts=placed.starts)
+    resolved = replace(
+        resolved,
+        starts={**placed.starts, **resolved.starts},
+        rejected={**placed.rejected, **resolved.rejected},
+        notes=(*placed.notes, *resolved.notes),
+        frequencies=placed.frequencies,
+    )
     if resolved.rejected:
         remaining = without_shots(electronics, set(resolved.rejected))
-        network = build_network(campaign, phases, remaining, settings=settings, motion=motion)
+        network = build_network(campaign, phases, remaining, settings=settings, motion=motion, allowance=allowance)
     if not network.rangers:
         why = next(iter(resolved.rejected.values()), "no shot on any target has a usable phase and reference")
         raise InputError(f"shots.csv: {why}; nothing to adjust")
-    settled = iterate_adjustment(network, resolved.starts, progress)
-    for _ in range(JUDGED):
-        allowance, before = allowed(settled), settled.network.allowance
-        settled = settled._replace(network=replace(settled.network, allowance=allowance))
-        if allowance.same(before):
-            break
-        network = build_network(
-            campaign, phases, settled.network.electronics, settings=settings, motion=motion, allowance=allowance
-        ).with_strength(settled.network.strength)
-        starts = {name: settled.solution.x[network.layout.columns(name)] for name in network.places}
-        settled = iterate_adjustment(network, starts, progress, active=selection_of(settled, network))
-    return settled, resolved
+    return first_adjustment(network, resolved.starts, progress), resolved
 
 
-def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCoordinates:
+def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records: bool = True) -> AdjustedCoordinates:
     """Points, ranges, heads and air of an adjusted network.
 
-    settled    result of `iterate_adjustment`
-    resolved   whole cycles resolved beforehand
+    settled        result of `iterate_adjustment`
+    resolved       whole cycles resolved beforehand
+    with_records   False leaves out the table of all records' tests
     """
     network, solution, shots = settled
-    ranges = ranges_of(network, solution, shots)
+    tests = [
+        line_tests(group, part.target, fit, solution=solution)
+        for (group, part), fit in zip(shots, solution.fits, strict=False)
+    ]
+    ranges = ranges_of(network, solution, shots, tests)
     adjusted = solution.q.diagonal()
     solution = considered(network, solution, shots)
     solution = network.allowance.considered(network.field, solution, network.layout.air)
     layout, campaign = network.layout, network.campaign
-    names = sorted([*network.places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
+    doubtful = resolved.doubtful | set(ranges.ill_fitting)
+    independence = independence_of(network, tests, claimed=solution.q, doubtful=doubtful)
+    places = {n: place for n, place in network.places.items() if n not in independence.unmeasured}
+    names = sorted([*places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
     columns = np.array([layout.columns(n) for n in names])
     count = dict.fromkeys(names, 0)
     for ranger, target, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True):
-        count[ranger] += int(used)
-        count[target] += int(used)
+        if used:
+            count[ranger] += 1
+            count[target] += 1
     judged = [f.name for f in solution.fits if f.name not in UNJUDGED]
     factor, degrees = solution.variance_factor(judged)
 
@@ -204,7 +257,9 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     air_estimates = {n: estimate(int(k)) for k, n in constant_parameters}
     sound = {line.name: air_estimates[line.name] for line in network.field.lines}
     air = {n: value for n, value in air_estimates.items() if n not in sound}
-    wrong, refuted = wrong_records(network, solution, air), refuted_priors(settled)
+    disagreement = (resolved.frequencies.disagreement,) if resolved.frequencies.disagreement else ()
+    wrong, refuted = wrong_records(network), network.allowance.refuted
+    records, groups = record_tests(EpochRecords(network, settled.solution, shots)) if with_records else ((), ())
     heads = {
         str(layout.parameters[column]): column
         for n in network.rangers
@@ -214,9 +269,10 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
     zeros = {n: layout.at[Parameter(ParameterKind.ZERO, n)] for n in network.rangers}
     leakage_at = {n: layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2) for n in network.rangers}
     used_paths = ranges.refractivity[ranges.used]
+    ends = shot_ends(network.places, [(p.name, p.target, p.distance) for _, p in shots])
     return AdjustedCoordinates(
         points=tuple(names),
-        places=network.places,
+        places=places,
         x=solution.x[columns],
         joint=JointPoints.of(solution.q, columns),
         start=np.array(layout.start)[columns],
@@ -238,13 +294,25 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved) -> AdjustedCo
         notes=(
             *record_notes(network, solution, wrong, count),
             *sound_notes(network, solution, ranges, sound),
-            *loss_notes(ranges),
+            *loss_notes(ranges, independence),
             *resolved.notes,
             *cycle_notes(ranges),
         ),
         unresolved=resolved.rejected,
         sound=sound,
         strength=network.strength,
-        doubts=doubts_of(network, solution, wrong, refuted),
-        refuted=tuple(refuted),
+        doubts=(
+            *disagreement,
+            *doubts_of(network, solution, wrong, refuted),
+            *(loss_doubts(ranges, independence, campaign.triplet_of) if network.motion is None else ()),
+        ),
+        refuted=refuted,
+        records=records,
+        groups=groups,
+        contradictions=network.allowance.contradictions,
+        scatter=class_scatter(ends, solution.fits, network.allowance.sway),
+        lines=np.array([independence.lines.get(n, 0) for n in names]),
+        unchecked=independence.unchecked(names),
+        unmeasured=independence.unmeasured,
+        frequencies=resolved.frequencies,
     )

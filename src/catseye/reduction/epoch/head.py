@@ -1,12 +1,15 @@
 """Corrections of a ranger's head beyond zero and leakage.
 
-Three effects, each only where the mirror sheet gives a value or an uncertainty for it:
+Five effects, each only where the mirror sheet gives a value or an uncertainty for it:
 axes        the mirror's axes and the beam do not meet: of target and reference cube, each at its own angles
 amplitude   the phase grows with ln(amplitude); counted from the ranger's own reference shots, interpolated to the
             instant of the shot, so that the references themselves need no correction
 cyclic      a wave of the phase after the electronics'
+second pass light that the detector sends out again, in proportion to the return; the cube's own is part of D0
+image       places of the images on a detector whose centre is late: the mean of the effect, a constant of the head
 The sheet's values are applied; their errors are parameters of the ranger, shared by all its shots, with the sheet's
-uncertainties as priors (u_axis_mm: the four offsets independent of each other).
+uncertainties as priors (u_axis_mm: the four offsets independent of each other). An image's place is another one each
+shot: its effect has no parameter, but is noise of the shot, like light back into the laser (`head_noise`).
 
 A campaign's records carry no encoder counts: a shot is taken as fired in the direct pointing, unless the mirror's
 azimuth limits forbid that and allow the prime one.
@@ -22,14 +25,17 @@ from catseye.errors import ValidityError
 from catseye.geometry.mirror.encoder import HALF_TURN, azimuth_angle, azimuth_counts, elevation_angle, within
 from catseye.geometry.mirror.mirror_path import beam_angles, direction_angles, path_change
 from catseye.geometry.mirror.pointing import MirrorStation
+from catseye.optics.detector import ImageLead, image_lead
 from catseye.records.files.refusal import refusal
 from catseye.records.night.campaign import ObservedSite
-from catseye.records.site.mirror import Mirror
+from catseye.records.site.mirror import Mirror, MirrorGeometry
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.site.stations import AXES, station_in
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient, amplitude_phase
 from catseye.signal.systematics.cyclic import cyclic_design, cyclic_range
+from catseye.signal.systematics.multipath import second_pass_turn
 
+LASER, IMAGE = "light back into the laser", "image on the detector"  # noise of each shot by itself
 UNSAID_ORDERS = 2  # of a cyclic deviation for which the sheet gives only the uncertainty
 
 
@@ -88,7 +94,15 @@ def head_unknowns(campaign: ObservedSite, name: str) -> list[Unknown]:
         unknowns.append(
             Unknown(Parameter(ParameterKind.CYCLIC, name), parts, mirror.u_cyclic_mm * MILLIMETRE, "u_cyclic_mm")
         )
+    if mirror.u_second_pass_per_volt is not None:
+        second = Parameter(ParameterKind.SECOND_PASS, name)
+        unknowns.append(Unknown(second, ("cosine", "sine"), mirror.u_second_pass_per_volt, "u_second_pass_per_volt"))
     return unknowns
+
+
+def radian_length(modulation_hz: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """Range (m,) of a radian of phase, m, at modulation frequencies, Hz, in air of a group index."""
+    return 0.5 * SPEED_OF_LIGHT / (modulation_hz * TWO_PI * index)
 
 
 def head_corrections(
@@ -100,7 +114,7 @@ def head_corrections(
     phase: np.ndarray,
     amplitude: np.ndarray,
     reference_amplitude: np.ndarray,
-    index: np.ndarray,
+    per_radian: np.ndarray,
 ) -> HeadCorrections:
     """Corrections of one ranger's ranges and their derivatives.
 
@@ -110,24 +124,31 @@ def head_corrections(
     phase                (m,) rad, the target's after the electronics', as measured
     amplitude            (m,) V, of the target's return
     reference_amplitude  (m,) V, of the cube's return at that instant
-    index                (m,) group index of the path
+    per_radian           (m,) m, from `radian_length`
 
     The amplitude's own noise is left out: it adds coefficient^2/2 of the phase's u, at most half a percent.
 
-    Source: [PARKER04] section 5.3 (axes), chapter 6, item 5 (amplitude), 5.2.1 (causes of a cyclic deviation).
+    Source: [PARKER04] section 5.3 (axes), chapter 6, items 2 (image), 3 (second pass) and 5 (amplitude), section 5.2.1
+    (causes of a cyclic deviation).
     """
     mirror = campaign.mirror_of(name)
     m = len(phase)
     value, columns, slopes = np.zeros(m), [], []
+    if mirror.u_image_um is not None:
+        value = value + per_radian * float(image_of(mirror).mean)
     for unknown in head_unknowns(campaign, name):
         kind = unknown.quantity.kind
         if kind is ParameterKind.AXES:
             change, by = _axes(campaign, name, sight)
         elif kind is ParameterKind.AMPLITUDE:
             # A phase read too high is a range read too short.
-            per_radian = 0.5 * SPEED_OF_LIGHT / (campaign.site.ranging.modulation_hz * TWO_PI * index)
             change = per_radian * amplitude_phase(amplitude, reference_amplitude, mirror.amplitude_to_phase_rad)
             by = per_radian[:, None] * amplitude_by_coefficient(amplitude, reference_amplitude)[:, :1]
+        elif kind is ParameterKind.SECOND_PASS:
+            turn, slope = second_pass_turn(
+                phase, amplitude, mirror.second_pass_cosine_per_volt, mirror.second_pass_sine_per_volt
+            )
+            change, by = -per_radian * turn, -per_radian[:, None] * slope
         else:
             cosine, sine = (np.array(c) * MILLIMETRE for c in (mirror.cyclic_cosine_mm, mirror.cyclic_sine_mm))
             change, by = -cyclic_range(phase, cosine, sine), -cyclic_design(phase, _orders(mirror))
@@ -138,6 +159,28 @@ def head_corrections(
     return HeadCorrections(
         value, np.concatenate([no_columns.astype(int), *columns], 1), np.concatenate([no_columns, *slopes], 1)
     )
+
+
+def image_of(mirror: MirrorGeometry) -> ImageLead:
+    """Lead, rad, of a head's signals by the places of their images; zero where the sheet has none."""
+    if mirror.u_image_um is None or mirror.detector_radius_mm is None:
+        return ImageLead(np.zeros(()), np.zeros(()))
+    radius = mirror.detector_radius_mm * MILLIMETRE
+    offset, u = mirror.image_offset_um * 1e-6, mirror.u_image_um * 1e-6
+    return image_lead(offset, u, lag=mirror.detector_lag_rad, radius=radius)
+
+
+def head_noise(mirror: MirrorGeometry) -> dict[str, float]:
+    """Standard uncertainties, rad, of one shot's phase by a head's effects that are new each shot.
+
+    By name of the effect; only those that the sheet has.
+    """
+    noise = {}
+    if mirror.u_feedback_rad is not None:
+        noise[LASER] = mirror.u_feedback_rad
+    if mirror.u_image_um is not None:
+        noise[IMAGE] = float(image_of(mirror).u)
+    return noise
 
 
 def _orders(mirror: Mirror) -> int:

@@ -3,26 +3,24 @@
 from collections.abc import Collection, Mapping
 
 import numpy as np
+from scipy.stats import binom
 
-from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import MILLIMETRE
 from catseye.estimation.least_squares.adjustment import (
     LeastSquaresSolution,
 )
-from catseye.estimation.least_squares.robust import CHECKED
+from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.allowance import DOUBTED_C
-from catseye.reduction.epoch.cycles import MANY
+from catseye.reduction.epoch.contradictions.contradiction import Contradiction, RecordGroup
+from catseye.reduction.epoch.lines.cycles import MANY
+from catseye.reduction.epoch.lines.independence import Independence
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
+from catseye.reduction.epoch.prior_names import SOUND
 from catseye.reduction.epoch.range_shots import RangeShots
-from catseye.reduction.epoch.unknowns import (
-    HEADS,
-    SOUND,
-    THERMOMETERS,
-    WEAK,
-    ZEROS,
-    CampaignNetwork,
-)
-from catseye.reduction.site.agreement import StationSeries, distance_disagreement, weather_disagreements
+from catseye.reduction.epoch.unknowns import WEAK, CampaignNetwork
+from catseye.reduction.site.agreement import distance_disagreement, station_series, weather_disagreements
+
+BY_CHANCE = 0.01  # expected points of a night whose shots are lost by chance, below which a point is doubted
 
 
 def cycle_notes(ranges: RangeShots) -> list[str]:
@@ -54,21 +52,24 @@ def _summarized(notes: Mapping[str, str], what: str) -> list[str]:
     return [f"{len(notes)} {what}: {', '.join(list(notes)[:MANY])} ..."]
 
 
-def loss_notes(ranges: RangeShots) -> list[str]:
+def loss_notes(ranges: RangeShots, independence: Independence) -> list[str]:
     """Targets without used or checked shots; rangers that lost most shots."""
     unmeasured, unchecked = {}, {}
     for name, mine in _by_target(ranges):
         used = ranges.used[mine]
-        alone = used & (ranges.detectable[mine] >= CHECKED * ranges.u_range[mine])
         if not used.any():
             unmeasured[name] = (
-                f"{name}: none of its {len(mine)} shots fits the others and its typed position: its coordinates here "
-                "are not measured; check its typed position or give its uncertainty (u_position_mm)"
+                f"{name}: none of its {len(mine)} shots fits the others and its typed position: it is not among the "
+                "results; check its typed position or give its uncertainty (u_position_mm)"
+                if name in independence.unmeasured
+                else f"{name}: none of its {len(mine)} shots fits: its coordinates follow from what else is known of it"
             )
-        elif not used.all() and alone.any():
+        elif not used.all() and name not in independence.doubtful and independence.unchecked([name]):
+            lines = independence.lines[name]
             unchecked[name] = (
-                f"{name}: {(~used).sum()} of its {len(mine)} shots contradict the rest and nothing checks "
-                f"{alone.sum()} of those left: its error may exceed its uncertainty; range it again"
+                f"{name}: {(~used).sum()} of its {len(mine)} shots contradict the rest, and nothing checks the "
+                f"{lines} {'line' if lines == 1 else 'lines'} left: its error may exceed its "
+                "uncertainty; range it again"
             )
     notes = [
         *_summarized(
@@ -76,76 +77,79 @@ def loss_notes(ranges: RangeShots) -> list[str]:
         ),
         *_summarized(
             unchecked,
-            "points lost shots that contradict the rest, and nothing checks those left: their errors may "
+            "points lost shots that contradict the rest, and the lines left do not check each other: their errors may "
             "exceed their uncertainties; range them again",
         ),
     ]
-    ranger = np.array(ranges.ranger)
-    for name in sorted(set(ranges.ranger)):
-        mine = ranger == name
-        if mine.sum() > 2 and (mine & ~ranges.used).sum() > mine.sum() / 2:
-            notes.append(
-                f"{name}: {(mine & ~ranges.used).sum()} of its {mine.sum()} shots do not fit: more likely its survey, "
-                "mirror sheet or samples than a stray reflection"
-            )
+    notes += [
+        f"{name}: {rejected} of its {fired} shots do not fit: more likely its survey, mirror sheet or samples than a "
+        "stray reflection"
+        for name, (rejected, fired) in ranges.ill_fitting.items()
+    ]
     return notes
 
 
-def wrong_records(
-    network: CampaignNetwork, solution: LeastSquaresSolution, air: dict[str, tuple[float, float]]
-) -> list[str]:
-    """Records contradicted by the ranges or by each other.
+def loss_doubts(ranges: RangeShots, independence: Independence, units: Mapping[str, str]) -> list[str]:
+    """Targets that lost more shots than stray reflections explain, and whose lines left do not check each other.
 
-    Thermometers, zeros, effects of heads, weather stations.
+    units   target of a triplet: the triplet, which is one target here
 
-    air   estimate and standard uncertainty of each thermometer's offset, °C
+    Strays hit each shot with the share that the other targets' shots were lost with, those of rangers most of whose
+    shots do not fit aside. What is left of such a target may agree with a wrong typed position alone.
     """
-    notes = disagreements(network)
-    for group, fit in zip(network.priors, solution.fits[-len(network.priors) :], strict=True):
-        if fit.name in (THERMOMETERS, ZEROS):  # not of all, where earlier epochs determined some
-            owners = [network.layout.parameters[c].of for c in np.ravel(group.columns).tolist()]
-        if fit.name == THERMOMETERS:
-            for station, active in zip(owners, fit.active, strict=True):
-                value, u = air[station]
-                if not active:
-                    notes.append(f"{station}'s thermometer is biased by {value:+.2f} °C (u {u:.2f} °C)")
-        if fit.name == ZEROS:
-            for ranger, active, off, u in zip(owners, fit.active, fit.residual, fit.sigma, strict=True):
-                if not active:
-                    notes.append(
-                        f"{ranger}'s zero is not the sheet's: its ranges imply {-off / MILLIMETRE:+.3f} mm, "
-                        f"{abs(off) / u:.0f} u_d0: see d0_mm of {network.campaign.mirror_of(ranger).zp}"
-                    )
-        if fit.name == HEADS and np.any(np.abs(fit.standardised) > network.settings.critical):
-            worst = int(np.argmax(np.abs(fit.standardised)))
-            called = network.layout.parameters[int(np.ravel(group.columns)[worst])]
-            notes.append(
-                f"{called}: not the mirror sheet's, the ranges contradict it (w {fit.standardised[worst]:.1f}, limit "
-                f"{network.settings.critical}); check the sheet's value and u"
+    judged = ~np.isin(ranges.ranger, list(ranges.ill_fitting))
+    lost, fired = int((judged & ~ranges.used).sum()), int(judged.sum())
+    targets: dict[str, list[np.ndarray]] = {}
+    unchecked = set()
+    for name, rows in _by_target(ranges):
+        unit = units.get(name, name)
+        targets.setdefault(unit, []).append(rows[judged[rows]])
+        if independence.unchecked([name]):
+            unchecked.add(unit)
+    doubts = []
+    for name in sorted(unchecked):
+        mine = np.concatenate(targets[name])
+        own = int((~ranges.used[mine]).sum())
+        share = (lost - own + 1) / (fired - len(mine) + 2)
+        chance = len(targets) * float(binom.sf(own - 1, len(mine), share))
+        if 0 < own < len(mine) and chance < BY_CHANCE:
+            doubts.append(
+                f"{name}: {own} of its {len(mine)} shots contradict the rest, more than stray reflections explain, and "
+                "nothing checks the lines left: check its typed position, range it again"
             )
-    return notes
+    return doubts
+
+
+def wrong_records(network: CampaignNetwork) -> list[str]:
+    """Records contradicted by the ranges or by each other."""
+    return [
+        *disagreements(network),
+        *(contradiction_text(c, network.campaign) for c in network.allowance.contradictions),
+    ]
+
+
+def contradiction_text(contradiction: Contradiction, site: SiteFolder) -> str:
+    """A contradiction as a note; of a thermometer, a zero and a head with what an operator asks of them."""
+    first, *others = contradiction.explanations
+    if first.group is RecordGroup.HEADS:
+        text = f"{first.record}: not the mirror sheet's, the ranges contradict it: check the sheet's value and u; "
+        return text + "; or ".join(e.text for e in (first, *others))
+    named = contradiction.named
+    if named is None or not named.of or named.group not in (RecordGroup.THERMOMETERS, RecordGroup.ZEROS):
+        return contradiction.text
+    (error,), (u,) = named.errors, named.u
+    if named.group is RecordGroup.THERMOMETERS:
+        return f"{named.of}'s thermometer is biased by {error:+.2f} °C (u {u:.2f} °C)"
+    mirror = site.mirror_of(named.of)
+    return (
+        f"{named.of}'s zero is not the sheet's: its ranges imply {-error:+.3f} mm, {abs(error) / mirror.u_d0_mm:.0f} "
+        f"u_d0: see d0_mm of {mirror.zp}"
+    )
 
 
 def disagreements(network: CampaignNetwork) -> list[str]:
-    """Records that cannot be right.
-
-    Humidity typed as a fraction, stations or distances that contradict each other.
-    """
-    weather = network.campaign.weather
-    names, series = np.array(weather.station), []
-    for station in network.campaign.site.weather_station:
-        rows = names == station.name
-        series.append(
-            StationSeries(
-                name=station.name,
-                elevation_m=station.elevation_m,
-                mjd=weather.mjd_utc[rows],
-                temperature_c=weather.temperature_c[rows],
-                pressure_hpa=weather.pressure_hpa[rows],
-                humidity_percent=weather.humidity_percent[rows],
-            )
-        )
-    conflicts = list(weather_disagreements([s for s in series if len(s.mjd)]))
+    """Stations or distances that contradict each other."""
+    conflicts = list(weather_disagreements(station_series(network.campaign)))
     for mark in network.campaign.benchmarks:
         ends = [network.places[name] for name in (mark.ranger, mark.target) if name in network.places]
         if len(ends) == 2:
@@ -158,8 +162,7 @@ def disagreements(network: CampaignNetwork) -> list[str]:
                 covariance=np.diag(u**2),
             )
             conflicts += [] if apart is None else [apart]
-    fractions = [f"weather.csv: {s.name}: {text}" for s in series for text in humidity_doubts(s.humidity_percent)]
-    return [*fractions, *(conflict.text for conflict in conflicts)]
+    return [conflict.text for conflict in conflicts]
 
 
 def record_notes(
@@ -178,9 +181,11 @@ def record_notes(
             f"with so many shots, weak modes of the electronics count as the shots' own errors, the strongest with "
             f"{100.0 * left_out:.0f} % of their variance, which shots between the same two references share"
         )
-    typed = [n for n, p in sorted(network.places.items()) if p.typed and count[n] >= 3]  # fewer do not place a point
+    typed = [
+        n for n, p in sorted(network.places.items()) if p.typed and count.get(n, 0) >= 3
+    ]  # fewer do not place a point
     moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
-    unit = {t: triplet.triplet for triplet in network.campaign.triplets.values() for t in triplet.targets}
+    unit = network.campaign.triplet_of
     usual = float(np.median(moved)) / 1.538 if len(moved) > 5 else np.inf  # median of chi with 3 degrees of freedom
     wrong = {
         unit.get(n, n): d
@@ -204,7 +209,8 @@ def doubts_of(
     wrong     result of `wrong_records`
     refuted   parameters whose priors were left out, which `wrong` names
     """
-    doubts = [*wrong, *network.allowance.texts]
+    resting = network.motion is None  # while it runs, an unusual gradient is an alarm: somebody can look
+    doubts = [*wrong, *(network.allowance.doubts if resting else network.allowance.texts)]
     air = network.field
     sigmas = network.allowance.sigmas(air)
     named = {*refuted, *(reason.subject for reason in network.allowance.reasons)}

@@ -22,6 +22,7 @@ class ParameterKind(Enum):
     AXES = "axes {of} {part}"  # errors of the sheet's four offsets of the mirror's axes and the beam
     AMPLITUDE = "amplitude {of}"
     CYCLIC = "cyclic {of} {part}"
+    SECOND_PASS = "second pass {of} {part}"  # errors of the sheet's light that the detector sends out again
     BODY = "body {of} {part}"  # departure of the dish or the arm as a whole from the nominal posture
     NORMAL = "normal {of} {part}"  # tilts of a prism's face or of a triplet's plate
     GLASS = "glass {of}"
@@ -35,6 +36,7 @@ class ParameterKind(Enum):
     RADIATION = "sunshine on {of}"  # °C, bias of its thermometer for the Sun in the zenith
     AIR = "air's {of} {part}"  # a knot of the process in time: of its level, slope, east, north
     FAMILY = "unexplained {of} {part}"  # of a bin of `self_check`: of a family of shots, its number
+    RECORD = "error of {of} {part}"  # of a record that changes ranges and has no prior: modulation, pressure, movement
     TELESCOPE = "telescope's {of} {part}"  # a knot of the telescope's motion and expansion during a campaign
 
 

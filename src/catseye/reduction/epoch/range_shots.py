@@ -1,20 +1,16 @@
 """Ranges of an adjusted network, with corrections, residuals and tests."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import SPEED_OF_LIGHT
-from catseye.estimation.least_squares.adjustment import (
-    GroupFit,
-    LeastSquaresSolution,
-)
-from catseye.reduction.epoch.cycles import REQUIRED_SIGMAS, line_errors
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, LeastSquaresSolution
+from catseye.reduction.epoch.lines.cycles import REQUIRED_SIGMAS
+from catseye.reduction.epoch.lines.line_tests import LineTests
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
-from catseye.reduction.epoch.unknowns import (
-    CampaignNetwork,
-)
+from catseye.reduction.epoch.unknowns import CampaignNetwork
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,21 +68,31 @@ class RangeShots:
     used: np.ndarray
     thin: np.ndarray
 
+    @property
+    def ill_fitting(self) -> dict[str, tuple[int, int]]:
+        """Rangers most of whose shots do not fit: number of rejected shots, and of all."""
+        ranger = np.array(self.ranger)
+        counts = {n: (int((~self.used[ranger == n]).sum()), int((ranger == n).sum())) for n in sorted(set(self.ranger))}
+        return {n: (rejected, fired) for n, (rejected, fired) in counts.items() if fired > 2 and 2 * rejected > fired}
+
 
 def ranges_of(
-    network: CampaignNetwork, solution: LeastSquaresSolution, shots: list[tuple[ShotGroup, ShotParts]]
+    network: CampaignNetwork,
+    solution: LeastSquaresSolution,
+    shots: list[tuple[ShotGroup, ShotParts]],
+    lines: Sequence[LineTests],
 ) -> RangeShots:
     x, layout, parts = solution.x, network.layout, [p for _, p in shots]
     fits = solution.fits[: len(parts)]
     zero, leakage, glass, range_, u_range, residual, detectable, thin, redundancy = [], [], [], [], [], [], [], [], []
-    quarter = 0.25 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz  # of the optical length, as the fits
-    for (group, part), fit in zip(shots, fits, strict=True):
+    for (group, part), fit, tests in zip(shots, fits, lines, strict=True):
         n = 1.0 + part.refractivity
+        quarter = 0.5 * network.campaign.half_wavelengths(part.electronics.shots)  # of the optical length, as the fits
         own_zero = np.full(len(n), x[layout.at[Parameter(ParameterKind.ZERO, part.name)]])
         at = x[layout.columns(part.name)]
         to = np.array([x[layout.columns(t)] for t in part.target])
         zero.append(own_zero)
-        leakage.append(-(part.leakage_slope @ x[layout.columns(Parameter(ParameterKind.LEAKAGE, part.name), 2)]) / n)
+        leakage.append(-np.sum(part.leakage_slope * x[part.leakage_columns], axis=1) / n)
         constants = [Parameter(ParameterKind.GLASS, t) for t in part.target]
         glass_correction = [x[layout.at[c]] if c in layout.at else 0.0 for c in constants]
         glass.append(part.glass + np.array(glass_correction))
@@ -96,8 +102,11 @@ def ranges_of(
         u_range.append(np.sqrt(part.variance) / n)
         redundancy.append(_redundancy(group, part, fit, solution))
         detectable.append(fit.detectable_error / n)
-        error, u = line_errors(group, part.target, fit, solution=solution)
-        thin.append(np.abs(error) + REQUIRED_SIGMAS * u >= quarter)
+        alone = np.abs(fit.estimated_error) + REQUIRED_SIGMAS * fit.detectable_error / NONCENTRALITY >= quarter
+        together = np.abs(tests.error) + REQUIRED_SIGMAS * tests.u
+        uncertain = np.where(fit.active, together[tests.line] >= quarter, alone) if len(together) else alone
+        cycles = network.phases.cycles
+        thin.append(uncertain if cycles is None else uncertain & (cycles[part.electronics.shots] < 0))
     join = np.concatenate
     return RangeShots(
         shot=join([p.electronics.shots for p in parts]),

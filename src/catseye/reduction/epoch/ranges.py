@@ -4,14 +4,16 @@ The drift is from the reference shots.
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from catseye.aliases import Progress
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import EstimationError
+from catseye.names import megahertz
 from catseye.records.night.campaign import REFERENCE, Campaign, ObservedSite
 from catseye.records.night.shot import release_buffers
 from catseye.records.site.mirror import Mirror
@@ -20,6 +22,7 @@ from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.signal.cycles.whole import fraction
 from catseye.signal.detection.buffers import BufferStatus, inspect_buffers
 from catseye.signal.detection.cycle_scatter import FEWEST_FOR_BATCHES, CycleScatter
+from catseye.signal.detection.harmonics import distorted, relative_harmonics
 from catseye.signal.drift.reference import drift_along, drift_at, reference_prediction_error
 from catseye.signal.drift.states import DriftStates, drift_states
 from catseye.signal.drift.walk import estimate_walk, walk_test
@@ -59,6 +62,8 @@ class Phases:
     harmonics   V, (n, 2), amplitudes of harmonics 2 and 3
     largest     V, largest magnitude of a sample
     reason      reason that a shot cannot be used, None where it can
+    cycles      whole half wavelengths that several modulation frequencies of a line give, -1 for none; None where all
+                shots have the site's
     """
 
     phasor: np.ndarray
@@ -68,6 +73,7 @@ class Phases:
     harmonics: np.ndarray
     largest: np.ndarray
     reason: tuple[Reason | None, ...]
+    cycles: np.ndarray | None = None
 
     @staticmethod
     def of(shots: Sequence["ShotPhase"]) -> "Phases":
@@ -101,6 +107,17 @@ class Phases:
         amplitude = self.amplitude
         return np.divide(self.u_across, amplitude, out=np.full_like(self.u_across, np.inf), where=amplitude > 0.0)
 
+    @property
+    def relative_harmonics(self) -> np.ndarray:
+        """Harmonics 2 and 3 over the return, (n, 2); NaN without one."""
+        return relative_harmonics(self.harmonics, self.amplitude, self.u_phasor)[0]
+
+    @property
+    def distorted(self) -> np.ndarray:
+        """True (n,) for usable shots with a harmonic beyond the limit, see `signal.detection.harmonics`."""
+        usable = np.array([reason is None for reason in self.reason], dtype=bool)
+        return usable & distorted(*relative_harmonics(self.harmonics, self.amplitude, self.u_phasor))
+
 
 @dataclass(frozen=True, eq=False)
 class ElectronicsPhase:
@@ -131,6 +148,20 @@ class ElectronicsPhase:
             time=self.walk.seconds[rows],
             random_walk=self.walk.random_walk,
         )[1]
+
+    @staticmethod
+    def joined(parts: "Sequence[ElectronicsPhase]") -> "ElectronicsPhase":
+        """Electronics phase of a ranger from its parts, one a modulation frequency, in the order of shots."""
+        if len(parts) == 1:
+            return parts[0]
+        shots = np.concatenate([part.shots for part in parts])
+        order = np.argsort(shots, kind="stable")
+        return ElectronicsPhase(
+            shots[order],
+            np.concatenate([part.phase for part in parts])[order],
+            block_diag(*(part.covariance for part in parts))[np.ix_(order, order)],
+            np.concatenate([part.reference for part in parts])[order],
+        )
 
     def of(self, keep: np.ndarray) -> "ElectronicsPhase":
         """Electronics phase at some of the shots, (m,) bool."""
@@ -199,7 +230,7 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
             if progress is not None:
                 progress("samples to phases", processed, n)
     release_buffers(campaign.frames)  # a third of a gigabyte for a whole dish
-    mirrors = [campaign.mirror_of(ranger) for ranger in shots.ranger]
+    mirrors = _sheets_of_shots(campaign)
     phases = judged_phases(
         detected,
         shots.cycles,
@@ -213,6 +244,16 @@ def measure_phases(campaign: Campaign, settings: ReductionSettings, progress: Pr
     return replace(
         phases, reason=tuple(reason or (why and Reason(ShotStatus.DOUBTED, why)) or None for reason, why in pairs)
     )
+
+
+def _sheets_of_shots(campaign: ObservedSite) -> list[Mirror]:
+    """Sheet of each shot's head, with the leakage at the shot's modulation frequency."""
+    rangers = campaign.shots.ranger
+    if not campaign.several_frequencies:
+        return [campaign.mirror_of(ranger) for ranger in rangers]
+    pairs = list(zip(rangers, campaign.modulation_of(np.arange(len(rangers))).tolist(), strict=True))
+    sheets = {(ranger, hz): campaign.mirror_of(ranger).at_modulation(hz) for ranger, hz in dict.fromkeys(pairs)}
+    return [sheets[pair] for pair in pairs]
 
 
 @dataclass(frozen=True, eq=False)
@@ -404,21 +445,21 @@ def follow_electronics(
     dense_shots   most usable target shots of all rangers for which the errors' covariances are matrices
 
     References that miss the prediction of the others, or whose amplitude is not that of the cube alone, are left out; a
-    ranger without any good reference cannot range.
+    ranger without any good reference cannot range. The electronics have another phase at each modulation frequency: of
+    several, each follows its own references, with errors independent of the others', and covariances are matrices.
 
     Source: [PARKER04] eqs. 5.12 and 5.13; between references a random walk of the site's strength.
     """
     shots = campaign.shots
     seconds = (shots.mjd_utc - shots.mjd_utc[0]) * SECONDS_PER_DAY
     walk = campaign.site.ranging.electronic_drift_mrad_per_sqrt_hour * MRAD_PER_ROOT_HOUR
-    ranger, target = np.array(shots.ranger), np.array(shots.target)
+    target = np.array(shots.target)
     usable = np.array([not r for r in phases.reason])
     variance = np.where(usable, phases.u_phase, 0.0) ** 2
     rejected: dict[int, Reason] = {}
-    electronics: dict[str, ElectronicsPhase] = {}
-    large = np.count_nonzero(usable & (target != REFERENCE)) > dense_shots
-    for name in campaign.rangers:
-        mine = ranger == name
+    large = not campaign.several_frequencies and np.count_nonzero(usable & (target != REFERENCE)) > dense_shots
+    parts: dict[str, list[ElectronicsPhase]] = {}
+    for name, mine in _series(campaign):
         lit = np.flatnonzero(mine & usable & (target != REFERENCE))
         references = np.flatnonzero(mine & usable & (target == REFERENCE))
         references = references[np.argsort(seconds[references], kind="stable")]
@@ -426,7 +467,8 @@ def follow_electronics(
         rejected.update(wrong)
         references = np.array([k for k in references if k not in wrong], dtype=int)
         if not len(references):
-            text = f"{name} has no usable shot on its internal cube, its drift is unknown"
+            at = f" at {_megahertz(campaign, mine)}" if campaign.several_frequencies else ""
+            text = f"{name} has no usable shot on its internal cube{at}, its drift is unknown"
             rejected.update({int(k): Reason(ShotStatus.NO_REFERENCE, text) for k in lit})
             continue
         unwrapped = np.unwrap(np.angle(phases.phasor[references]))
@@ -435,11 +477,30 @@ def follow_electronics(
         if large:
             phase, u = drift_along(*references_data, time=seconds[lit], random_walk=walk)
             between = ReferenceWalk(seconds[lit], references_data[0], references_data[2], walk)
-            electronics[name] = ElectronicsPhase(lit, phase, u**2, level * np.exp(1j * phase), between)
+            part = ElectronicsPhase(lit, phase, u**2, level * np.exp(1j * phase), between)
         else:
             phase, covariance = drift_at(*references_data, time=seconds[lit], random_walk=walk)
-            electronics[name] = ElectronicsPhase(lit, phase, covariance, level * np.exp(1j * phase))
-    return electronics, rejected
+            part = ElectronicsPhase(lit, phase, covariance, level * np.exp(1j * phase))
+        parts.setdefault(name, []).append(part)
+    return {name: ElectronicsPhase.joined(mine) for name, mine in parts.items()}, rejected
+
+
+def _series(campaign: ObservedSite) -> Iterator[tuple[str, np.ndarray]]:
+    """Shots (n,) bool of each ranger, at one modulation frequency after the other."""
+    ranger = np.array(campaign.shots.ranger)
+    modulation = campaign.modulation_of(np.arange(len(ranger)))
+    for name in campaign.rangers:
+        mine = ranger == name
+        if not campaign.several_frequencies:
+            yield name, mine
+            continue
+        for hz in np.unique(modulation[mine]):
+            yield name, mine & (modulation == hz)
+
+
+def _megahertz(campaign: ObservedSite, shots: np.ndarray) -> str:
+    """Modulation frequency of the first of some shots, (n,) bool, in words."""
+    return megahertz(float(campaign.modulation_of(np.flatnonzero(shots)[:1])[0]))
 
 
 def walk_notes(campaign: ObservedSite, phases: Phases, wrong: Collection[int]) -> list[str]:
@@ -454,7 +515,7 @@ def walk_notes(campaign: ObservedSite, phases: Phases, wrong: Collection[int]) -
     shots = campaign.shots
     good = np.array([t == REFERENCE for t in shots.target]) & np.array([not r for r in phases.reason])
     good[list(wrong)] = False
-    rows = [np.flatnonzero(good & (np.array(shots.ranger) == name))[1:] for name in campaign.rangers]
+    rows = [np.flatnonzero(good & mine)[1:] for _, mine in _series(campaign)]
     rows = [r for r in rows if len(r) > 1 and np.ptp(shots.mjd_utc[r]) > 0.0]
     if not rows:
         return []

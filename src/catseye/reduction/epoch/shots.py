@@ -8,17 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
+from catseye.constants import MILLIMETRE, PPM, SECONDS_PER_DAY, TWO_PI
 from catseye.estimation.least_squares.conflict import SharedErrors
 from catseye.estimation.observations.kinds import Distances, MovingDistances
 from catseye.optics.retroreflector.prism import obliquity_correction, obliquity_slope
 from catseye.reduction.epoch.air.field import PathAir
-from catseye.reduction.epoch.head import HeadCorrections, head_corrections
+from catseye.reduction.epoch.contradictions.hypotheses import WITHOUT_PRIOR, ShotLines, parameter_of, slopes_of
+from catseye.reduction.epoch.head import HeadCorrections, head_corrections, head_noise, radian_length
+from catseye.reduction.epoch.motion.scatter import sway_variance
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import ElectronicsPhase
 from catseye.reduction.epoch.self_check import unit_of
 from catseye.reduction.epoch.telescope_track import buffer_middles
-from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
+from catseye.reduction.epoch.unknowns import CampaignNetwork, leakage_quantities, path_ppm
 from catseye.reduction.site.motion import shaken
 from catseye.signal.cycles.whole import fraction, unwrapped_length, whole_cycles
 
@@ -36,9 +38,11 @@ class ShotParts:
     refractivity       n_g - 1 along the path
     incidence          rad, on a prism's face
     glass, obliquity   Pc and dPc, m
+    leakage_columns    (m, 2) parameters of the residual leakage at each shot's modulation frequency
     leakage_slope      (m, 2) m/V, of the observed optical length by the residual leakage
     head               correction of the range for the ranger's head: `head.at(x)` with the estimated parameters
     distance           m, of the adjusted points
+    sight              lines, as errors of records change them
     variance           m^2, of the optical length, errors shared with other shots included
     lasting            parameters of the telescope's motion since the middle and of averages that are allowed for, -1
                        for none; and the derivatives of the optical length by them, m
@@ -56,9 +60,11 @@ class ShotParts:
     incidence: np.ndarray
     glass: np.ndarray
     obliquity: np.ndarray
+    leakage_columns: np.ndarray
     leakage_slope: np.ndarray
     head: HeadCorrections
     distance: np.ndarray
+    sight: ShotLines
     variance: np.ndarray
     lasting: tuple[np.ndarray, np.ndarray]
     shared: tuple[np.ndarray, np.ndarray]
@@ -151,7 +157,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     glass = np.array([places[t].constant for t in targets])
     incidence, obliquity, normal_columns, normal_slopes = _obliquity(network, targets, sights.ranger_seen, x)
 
-    half = 0.5 * SPEED_OF_LIGHT / campaign.site.ranging.modulation_hz  # in vacuum: optical metres
+    half = campaign.half_wavelengths(rows)  # in vacuum: optical metres
     phase = fraction(phases.phase[rows], electronics.phase)
     lit, cube = phases.phasor[rows], electronics.reference
     head = head_corrections(
@@ -162,7 +168,7 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         phase=phase,
         amplitude=np.abs(lit),
         reference_amplitude=np.abs(cube),
-        index=n,
+        per_radian=radian_length(campaign.modulation_of(rows), n),
     )
     zero = x[layout.at[Parameter(ParameterKind.ZERO, name)]]
     expanding, growth = _expansion(network, name, targets, sights)
@@ -170,10 +176,15 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
     expansion = np.sum(np.where(expanding < 0, 0.0, x[expanding]) * growth, axis=1)
     coarse = n * (distance + expansion - glass - obliquity - d0 - zero - head.at(x))
     cycles, margin = whole_cycles(coarse, phase, half)
+    if phases.cycles is not None:
+        cycles = np.where(phases.cycles[rows] < 0, cycles, phases.cycles[rows])
     observed = unwrapped_length(cycles, phase, half)
+    sight = _sight(network, name, targets, sights, index=n, optical=observed)
+    contradicted = _contradicted(network, sight)
     per_radian = -half / TWO_PI
     jitter = n**2 * _jitter(network, name, targets)
     shared = _shared(network, name, targets, distance=distance, per_radian=per_radian)
+    leakage = leakage_quantities(campaign, name, rows)
     covariance, variance = _covariance(network, name, targets, distance, per_radian)
     parts = ShotParts(
         name=name,
@@ -186,13 +197,15 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
         incidence=incidence,
         glass=glass,
         obliquity=obliquity,
+        leakage_columns=np.array([layout.columns(quantity, 2) for quantity in leakage]).reshape(-1, 2),
         leakage_slope=_leakage_slope(per_radian, lit, cube),
         head=head,
         distance=distance,
+        sight=sight,
         variance=variance + jitter,
         lasting=(
-            np.concatenate([expanding, families[0]], axis=1),
-            np.concatenate([n[:, None] * growth, families[1]], axis=1),
+            np.concatenate([expanding, families[0], contradicted[0]], axis=1),
+            np.concatenate([n[:, None] * growth, families[1], contradicted[1]], axis=1),
         ),
         shared=shared,
     )
@@ -236,18 +249,19 @@ def shot_group(network: CampaignNetwork, name: str, x: np.ndarray) -> tuple[Shot
 
 
 def _jitter(network: CampaignNetwork, name: str, targets: tuple[str, ...]) -> np.ndarray:
-    """Variance (m,), m^2, of the distances by the telescope's jitter.
+    """Variance (m,), m^2, of the distances by the telescope's jitter, and by the sway that is allowed for.
 
     By the campaign's table or the epoch's.
     """
-    table = network.campaign.jitter
+    table, body, bodies = network.campaign.jitter, network.places[name].body, [network.places[t].body for t in targets]
+    sway = sway_variance(body, bodies, network.allowance.sway)
     if table is None:
-        return np.zeros(len(targets)) if network.motion is None else network.motion.jitter(name, targets)
+        return sway if network.motion is None else sway + network.motion.jitter(name, targets)
     times = network.campaign.shots.mjd_utc[network.electronics[name].shots]
-    return shaken(network.places[name].body, [network.places[t].body for t in targets], table.mm(times))
+    return sway + shaken(body, bodies, table.mm(times))
 
 
-def _leakage_slope(per_radian: float, lit: np.ndarray, cube: np.ndarray) -> np.ndarray:
+def _leakage_slope(per_radian: np.ndarray, lit: np.ndarray, cube: np.ndarray) -> np.ndarray:
     """Derivative of the optical length by residual leakage, (m, 2) m/V.
 
     Residual leakage is complex, dL.
@@ -255,7 +269,7 @@ def _leakage_slope(per_radian: float, lit: np.ndarray, cube: np.ndarray) -> np.n
     A phasor A exp(i phi) turns by Im(dL exp(-i phi)) / A, reference and target alike.
     """
     turn = np.stack([(1.0 / p).imag for p in (lit, cube)]), np.stack([(1.0 / p).real for p in (lit, cube)])
-    return per_radian * np.stack([t[0] - t[1] for t in turn], axis=1)
+    return per_radian[:, None] * np.stack([t[0] - t[1] for t in turn], axis=1)
 
 
 def _covariance(
@@ -263,7 +277,7 @@ def _covariance(
     name: str,
     targets: tuple[str, ...],
     distance: np.ndarray,
-    per_radian: float,
+    per_radian: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Covariance of the optical lengths, m^2, and its diagonal.
 
@@ -273,6 +287,8 @@ def _covariance(
     """
     electronics = network.electronics[name]
     noise = (per_radian * network.phases.u_phase[electronics.shots]) ** 2
+    for u in head_noise(network.campaign.mirror_of(name)).values():
+        noise = noise + (per_radian * u) ** 2
     path = path_ppm(network) * PPM * distance
     eddies = (network.strength.eddies_ppm * PPM * distance) ** 2
     noise = noise + eddies
@@ -280,14 +296,14 @@ def _covariance(
         alone = np.array([Parameter(ParameterKind.REPEATS, name, t) not in network.layout.at for t in targets])
         independent = noise + per_radian**2 * network.states[name].own + np.where(alone, path**2, 0.0)
         return independent, noise + per_radian**2 * electronics.covariance + path**2
-    covariance = np.diag(noise) + per_radian**2 * electronics.covariance
+    covariance = np.diag(noise) + np.outer(per_radian, per_radian) * electronics.covariance
     same_target = np.array(targets)[:, None] == np.array(targets)
     covariance += same_target * np.outer(path, path)
     return covariance, np.diag(covariance).copy()
 
 
 def _shared(
-    network: CampaignNetwork, name: str, targets: tuple[str, ...], *, distance: np.ndarray, per_radian: float
+    network: CampaignNetwork, name: str, targets: tuple[str, ...], *, distance: np.ndarray, per_radian: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Parameters (m, w) of one ranger's shared errors, and derivatives.
 
@@ -300,7 +316,7 @@ def _shared(
     first = at[Parameter(ParameterKind.ELECTRONICS, name)]
     lines = np.array([at.get(Parameter(ParameterKind.REPEATS, name, t), -1) for t in targets])
     columns = np.concatenate([np.where(states.columns < 0, -1, first + states.columns), lines[:, None]], axis=1)
-    slopes = np.concatenate([per_radian * states.slopes, (PPM * distance * (lines >= 0))[:, None]], axis=1)
+    slopes = np.concatenate([per_radian[:, None] * states.slopes, (PPM * distance * (lines >= 0))[:, None]], axis=1)
     return columns, slopes
 
 
@@ -327,7 +343,7 @@ def _nuisance(
     columns = [
         paths,
         np.full((m, 1), layout.at[Parameter(ParameterKind.ZERO, parts.name)]),
-        np.broadcast_to(layout.columns(Parameter(ParameterKind.LEAKAGE, parts.name), 2), (m, 2)),
+        parts.leakage_columns,
         np.broadcast_to(layout.air[:constant_count], (m, constant_count)),
         layout.air[air.columns],
         parts.lasting[0],
@@ -377,6 +393,48 @@ def _families(
         columns[:, i] = np.where(bins < 0, -1, first + bins)
         slopes[:, i] = np.where(bins < 0, 0.0, unit_of(sorting.family, index, distance))
     return columns, slopes
+
+
+def _sight(
+    network: CampaignNetwork,
+    name: str,
+    targets: tuple[str, ...],
+    sights: _Sights,
+    *,
+    index: np.ndarray,
+    optical: np.ndarray,
+) -> ShotLines:
+    """Lines of one ranger's shots, as errors of records change them."""
+    times = network.campaign.shots.mjd_utc[network.electronics[name].shots]
+    temperature, pressure, humidity = network.field.smoothed(times).mean(axis=1).T
+    drier = humidity - np.where(humidity > 1.0, 1.0, 0.0)
+    more, less = (network.field.refractivity_of(temperature, pressure, h) for h in (drier + 1.0, drier))
+    return ShotLines(
+        name=name,
+        targets=targets,
+        towards=sights.towards,
+        index=index,
+        distance=sights.distance,
+        optical=optical,
+        seconds=(times - network.middle_mjd) * SECONDS_PER_DAY,
+        per_hpa=(index - 1.0) / pressure,
+        per_percent=more - less,
+        bodies=(network.places[name].body, tuple(network.places[t].body for t in targets)),
+        modulation_hz=network.campaign.modulation_of(network.electronics[name].shots),
+    )
+
+
+def _contradicted(network: CampaignNetwork, sight: ShotLines) -> tuple[np.ndarray, np.ndarray]:
+    """Parameters (m, e) of errors of records without priors, and their derivatives."""
+    m = len(sight.targets)
+    columns, slopes = [np.zeros((m, 0), dtype=int)], [np.zeros((m, 0))]
+    for key in network.allowance.errors:
+        if key.group in WITHOUT_PRIOR:
+            by = slopes_of(key, sight)
+            at = network.layout.columns(parameter_of(key), by.shape[1])
+            columns.append(np.broadcast_to(at, by.shape))
+            slopes.append(by)
+    return np.concatenate(columns, axis=1), np.concatenate(slopes, axis=1)
 
 
 def _expansion(

@@ -19,8 +19,8 @@ from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSqua
 from catseye.estimation.observations.kinds import Linear
 from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.air.process import LEAST, MOST, U_LAG, U_RADIATION, USUAL, WIDE, AirStrength
+from catseye.reduction.epoch.motion.telescope_motion import ALIKE, LEAST_WALK, MOST_WALK, PARTS, WALK, TelescopeKnots
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
-from catseye.reduction.epoch.telescope_motion import ALIKE, LEAST_WALK, MOST_WALK, PARTS, WALK, TelescopeKnots
 
 AIR_BETWEEN = "air between stations and paths"
 AIR_ACROSS = "air across the site"

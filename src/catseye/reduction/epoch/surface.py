@@ -14,9 +14,10 @@ from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.dish import dish_prisms
+from catseye.reduction.epoch.lines.cycles import MANY
 from catseye.reduction.site.places import nominal_frame
 
-FEWEST_CHECKS = 3  # used shots at a prism before it may shape the dish
+FEWEST_LINES = 3  # that place a prism
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
 
 
@@ -46,12 +47,15 @@ class DishFit:
     fit            the paraboloid and the deviations
     focal_length   m, as designed, fixed
     pivot          (3,) m, ground frame: the nominal vertex, about which the rotation turns
+    unchecked      prisms of these that an error of one of their lines would move unseen; () where there are enough
+                   others
     """
 
     names: tuple[str, ...]
     fit: ParaboloidFit
     focal_length: float
     pivot: np.ndarray
+    unchecked: tuple[str, ...] = ()
 
     @property
     def rms(self) -> float:
@@ -89,10 +93,21 @@ def fit_surface(campaign: ObservedSite, coordinates: AdjustedCoordinates) -> tup
 
     Single prisms of the reflector frame; the reason is "" where there is a fit.
 
-    A prism takes part with three used shots or more; with fewer its place along the surface's normal is uncertain.
+    A prism takes part if its lines check each other. Where that leaves too few for a fit, all with three lines do, and
+    `unchecked` names those that nothing checks.
     """
-    shots = dict(zip(coordinates.points, coordinates.shots.tolist(), strict=True))
-    names = tuple(name for name in dish_prisms(campaign) if shots.get(name, 0) >= FEWEST_CHECKS)
+    lines = dict(zip(coordinates.points, coordinates.lines.tolist(), strict=True))
+    ranged = tuple(name for name in dish_prisms(campaign) if lines.get(name, 0) >= FEWEST_LINES)
+    doubtful = frozenset(coordinates.unchecked)
+    checked = tuple(name for name in ranged if name not in doubtful)
+    fit, missing = _fit(campaign, coordinates, checked)
+    return (fit, missing) if fit is not None or len(ranged) == len(checked) else _fit(campaign, coordinates, ranged)
+
+
+def _fit(
+    campaign: ObservedSite, coordinates: AdjustedCoordinates, names: tuple[str, ...]
+) -> tuple[DishFit | None, str]:
+    """Dish through some prisms, or the reason that there is none."""
     nominal = nominal_frame(campaign)
     focal_length = campaign.site.paraboloid.focal_length_mm * MILLIMETRE
     rows = coordinates.rows(names)
@@ -105,4 +120,16 @@ def fit_surface(campaign: ObservedSite, coordinates: AdjustedCoordinates) -> tup
         )
     except EstimationError as problem:
         return None, f"no paraboloid: {problem}"
-    return DishFit(names, fit, focal_length, nominal.translation), ""
+    unchecked = tuple(name for name in names if name in coordinates.unchecked)
+    return DishFit(names, fit, focal_length, nominal.translation, unchecked), ""
+
+
+def surface_notes(surface: DishFit | None) -> list[str]:
+    """Note on prisms of surface and pose that nothing checks."""
+    if surface is None or not surface.unchecked:
+        return []
+    some = ", ".join(surface.unchecked[:MANY]) + " ..." * (len(surface.unchecked) > MANY)
+    return [
+        f"surface and pose depend on {len(surface.unchecked)} of {len(surface.names)} prisms whose lines do not check "
+        f"each other: {some}"
+    ]

@@ -12,6 +12,7 @@ from catseye.records.night.campaign import Campaign, ObservedSite
 from catseye.reduction.epoch.unknowns import middle_of
 from catseye.reduction.site.motion import PostureTrack, TelescopeCarrier, frames_of
 from catseye.reduction.site.places import RangedPoint
+from catseye.reduction.structure.site_bending import bending_of
 
 
 def motion_of(campaign: ObservedSite) -> TelescopeCarrier | None:
@@ -22,7 +23,8 @@ def motion_of(campaign: ObservedSite) -> TelescopeCarrier | None:
     if not campaign.postures:
         return None
     track = PostureTrack.of(campaign.postures)
-    return TelescopeCarrier(campaign, track, frames_of(campaign), middle_of(campaign.shots.mjd_utc))
+    middle = middle_of(campaign.shots.mjd_utc)
+    return TelescopeCarrier(campaign, track, frames_of(campaign), middle, bending=bending_of(campaign))
 
 
 def at_middle_posture(campaign: Campaign) -> Campaign:

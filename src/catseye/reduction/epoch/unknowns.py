@@ -13,35 +13,55 @@ from catseye.errors import InputError
 from catseye.estimation.least_squares.bordered import Border
 from catseye.estimation.observations.kinds import Distances, Linear, ObservationGroup
 from catseye.geometry.frames.rotation import skew
+from catseye.names import megahertz
 from catseye.records.night.campaign import REFERENCE, ObservedSite
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.allowance import NOTHING, Allowance
+from catseye.reduction.epoch.contradictions.contradiction import RecordGroup
+from catseye.reduction.epoch.contradictions.hypotheses import (
+    EVERYTHING,
+    RecordKey,
+    is_parameter,
+    parameter_of,
+    parts_of,
+    prior_hypotheses,
+    widened,
+    with_error,
+)
 from catseye.reduction.epoch.head import head_unknowns
+from catseye.reduction.epoch.motion.telescope_motion import PARTS, TelescopeKnots
 from catseye.reduction.epoch.parameter import AIR_KINDS, POINT_KINDS, XYZ, Parameter, ParameterKind
+from catseye.reduction.epoch.prior_names import (
+    APPROXIMATE,
+    BENCHMARKS,
+    CONTRADICTED,
+    ELECTRONICS,
+    FAMILIES,
+    GLASS,
+    HEADS,
+    LEAKAGE,
+    LIMITS,
+    MONUMENTS,
+    OFFSETS,
+    PATHS,
+    POSTURE,
+    REPEATS,
+    SOUND,
+    THERMOMETERS,
+    TRIPLET_AXES,
+    TRIPLET_BALLS,
+    TRIPLET_SPACINGS,
+    ZEROS,
+)
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases
 from catseye.reduction.epoch.self_check import Sorting, sortings
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.strengths import Processes, ProcessStrength, with_processes
-from catseye.reduction.epoch.telescope_motion import PARTS, TelescopeKnots
 from catseye.reduction.site.motion import TelescopeCarrier
 from catseye.reduction.site.places import RangedPoint, places_of, unit
 from catseye.signal.drift.states import DriftStates
 
-APPROXIMATE = "approximate positions"
-THERMOMETERS = "thermometers"
-SOUND = "path temperatures"
-ZEROS = "ranger zeros"
-BENCHMARKS, MONUMENTS, OFFSETS = "benchmarks", "monuments", "mirror offsets"
-TRIPLET_BALLS, GLASS = "triplet balls", "glass constants"
-LIMITS = "instruments' limits"
-FAMILIES_PRIOR = "unexplained averages"
-UNJUDGED = (APPROXIMATE, LIMITS)  # weak priors by intent, not counted in a variance factor
-HEADS = "head effects"
-PATHS = "lasting paths"
-POSTURE = "bodies off their posture"
-REPEATS = "repeated paths"
-ELECTRONICS = "electronics between references"
 MANY_OF_A_BODY = 150  # typed points from which a body's own place is a parameter
 APART = 600  # independent parameters from which each is a single row, not a matrix
 BLOCK_KINDS = (ParameterKind.POINT, ParameterKind.NORMAL, ParameterKind.GLASS)
@@ -236,10 +256,7 @@ def build_network(
         where = np.array([monument.x_mm, monument.y_mm, monument.z_mm]) * MILLIMETRE
         layout.add(Parameter(ParameterKind.FIXED_POINT, name), XYZ, where, [value > 0.0 for value in u])
     for name in sorted(shooting):
-        layout.add(Parameter(ParameterKind.ZERO, name), [""], [0.0])
-        layout.add(Parameter(ParameterKind.LEAKAGE, name), ["real", "imaginary"], [0.0, 0.0])
-        for unknown in head_unknowns(campaign, name):
-            layout.add(unknown.quantity, unknown.parts, np.zeros(len(unknown.parts)))
+        _add_head(layout, campaign, name)
     typed = {n: p for n, p in involved.items() if p.typed and n not in known}
     for body, count in sorted(Counter(p.body for p in typed.values() if p.body).items()):
         if count >= MANY_OF_A_BODY:
@@ -256,6 +273,7 @@ def build_network(
     for name in sorted(fired):
         if involved[name].u_constant > 0.0:
             layout.add(Parameter(ParameterKind.GLASS, name), [""], [0.0])
+    _add_errors(layout, allowance)
     ours = {n: e.shots for n, e in electronics.items() if len(e.shots)}
     sorts = _sorted(campaign, places, ours, layout, allowance=allowance)
     u_path = 0.0 if motion is None else motion.lasting * campaign.site.ranging.path_index_fluctuation_ppm
@@ -268,12 +286,14 @@ def build_network(
     priors = [
         *_priors(campaign, settings, involved, layout, air, allowance),
         *_families(layout, sorts, allowance),
+        *_contradicted(layout, allowance),
         *processes.priors(strength),
         *_typed(settings, typed, layout),
     ]
     if lines:
         columns = [layout.at[line] for line in lines]
         priors.append(_independent(PATHS, columns, np.zeros(len(lines)), np.full(len(lines), u_path)))
+    priors = _widened(priors, layout, campaign, involved, allowance)
     network = CampaignNetwork(
         campaign=campaign,
         settings=settings,
@@ -294,6 +314,35 @@ def build_network(
         network.priors[:] = [_apart(prior) for prior in priors]
         _share_by_states(network)
     return network
+
+
+def rebuilt(network: CampaignNetwork) -> CampaignNetwork:
+    """Network with the unknowns and priors of its campaign and its allowance, where these have changed."""
+    return build_network(
+        network.campaign,
+        network.phases,
+        network.electronics,
+        settings=network.settings,
+        motion=network.motion,
+        allowance=network.allowance,
+    ).with_strength(network.strength)
+
+
+def _add_head(layout: UnknownsLayout, campaign: ObservedSite, name: str) -> None:
+    """Add a ranger's zero, residual leakages and other effects of its head, in place."""
+    layout.add(Parameter(ParameterKind.ZERO, name), [""], [0.0])
+    for leakage in _leakages_of(campaign, name):
+        layout.add(leakage, [f"real {leakage.part}".strip(), f"imaginary {leakage.part}".strip()], [0.0, 0.0])
+    for unknown in head_unknowns(campaign, name):
+        layout.add(unknown.quantity, unknown.parts, np.zeros(len(unknown.parts)))
+
+
+def _add_errors(layout: UnknownsLayout, allowance: Allowance) -> None:
+    """Add parameters of contradicted records without priors, in place."""
+    for key in allowance.errors:
+        if is_parameter(key):
+            parts = parts_of(key.group)
+            layout.add(parameter_of(key), parts, np.zeros(len(parts)))
 
 
 def middle_of(mjd_utc: np.ndarray) -> float:
@@ -449,8 +498,53 @@ def _families(layout: UnknownsLayout, sorts: Sequence[Sorting], allowance: Allow
         count = len(sorting.labels)
         columns = layout.columns(Parameter(ParameterKind.FAMILY, sorting.family.name), count)
         sigma = np.full(count, allowance.families[sorting.family])
-        priors.append(_independent(FAMILIES_PRIOR, columns, np.zeros(count), sigma))
+        priors.append(_independent(FAMILIES, columns, np.zeros(count), sigma))
     return priors
+
+
+def _contradicted(layout: UnknownsLayout, allowance: Allowance) -> list[ObservationGroup]:
+    """Priors of errors of records that have none."""
+    priors: list[ObservationGroup] = []
+    for key, sigma in allowance.errors.items():
+        if is_parameter(key):
+            columns = layout.columns(parameter_of(key), len(sigma))
+            priors.append(_independent(CONTRADICTED, columns, np.zeros(len(sigma)), sigma))
+    return priors
+
+
+def _widened(
+    priors: list[ObservationGroup],
+    layout: UnknownsLayout,
+    campaign: ObservedSite,
+    places: dict[str, RangedPoint],
+    allowance: Allowance,
+) -> list[ObservationGroup]:
+    """Priors, those of contradicted records wider, and the limits of their instruments with them."""
+    if not allowance.errors:
+        return priors
+    result = [_beyond_limits(prior, layout, allowance) if prior.name == LIMITS else prior for prior in priors]
+    for hypothesis in prior_hypotheses(priors, layout.parameters, campaign, places):
+        sigma = allowance.errors.get(hypothesis.key)
+        for i, rows in hypothesis.priors.items() if sigma is not None else ():
+            if is_parameter(hypothesis.key):
+                result[i] = with_error(result[i], rows, layout.columns(parameter_of(hypothesis.key), 1))
+            else:
+                result[i] = widened(result[i], rows, np.array(sigma))
+    return result
+
+
+def _beyond_limits(prior: ObservationGroup, layout: UnknownsLayout, allowance: Allowance) -> ObservationGroup:
+    """Limits of instruments, wider where records of them are contradicted.
+
+    Of several explanations a limit would speak against the one that has it.
+    """
+    groups = {ParameterKind.ZERO: RecordGroup.ZEROS, ParameterKind.THERMOMETER: RecordGroup.THERMOMETERS}
+    for k, parameter in enumerate(layout.parameters[c] for c in np.ravel(prior.columns).tolist()):
+        for of in (parameter.of, EVERYTHING):
+            sigma = allowance.errors.get(RecordKey(groups[parameter.kind], of))
+            if sigma is not None:
+                prior = widened(prior, (np.array([k]), np.eye(1)), np.array(sigma))
+    return prior
 
 
 def _sound(air: AirField, columns: np.ndarray) -> list[ObservationGroup]:
@@ -537,14 +631,42 @@ def _heads(campaign: ObservedSite, layout: UnknownsLayout) -> list[ObservationGr
     mirrors = [campaign.mirror_of(n) for n in rangers]
     zeros = [layout.at[Parameter(ParameterKind.ZERO, n)] for n in rangers]
     u_zero = [_positive(m.u_d0_mm * MILLIMETRE, f"mirrors/{m.zp}.toml: u_d0_mm") for m in mirrors]
-    quadratures = [c for n in rangers for c in layout.columns(Parameter(ParameterKind.LEAKAGE, n), 2)]
-    u_leakage = [_positive(m.u_leakage_volt, f"mirrors/{m.zp}.toml: u_leakage_volt") for m in mirrors]
+    quadratures = [c for n in rangers for q in _leakages_of(campaign, n) for c in layout.columns(q, 2)]
+    u_leakage = [
+        _positive(u, f"mirrors/{m.zp}.toml: u_leakage_volt")
+        for n, m in zip(rangers, mirrors, strict=True)
+        for u in (m.at_modulation(hz).u_leakage_volt for hz in _modulations(campaign, n))
+    ]
     return [
         _independent(ZEROS, zeros, np.zeros(len(zeros)), u_zero),
         _independent(LIMITS, zeros, np.zeros(len(zeros)), np.full(len(zeros), WORST_ZERO)),
-        _independent("leakage", quadratures, np.zeros(len(quadratures)), np.repeat(u_leakage, 2)),
+        _independent(LEAKAGE, quadratures, np.zeros(len(quadratures)), np.repeat(u_leakage, 2)),
         *(_head(campaign, n, layout) for n in rangers if head_unknowns(campaign, n)),
     ]
+
+
+def _modulations(campaign: ObservedSite, name: str) -> list[float]:
+    """Modulation frequencies of a ranger, Hz: the site's, then further ones that it fired at."""
+    usual = campaign.site.ranging.modulation_hz
+    if not campaign.several_frequencies:
+        return [usual]
+    mine = np.flatnonzero(np.array(campaign.shots.ranger) == name)
+    return [usual, *(hz for hz in np.unique(campaign.modulation_of(mine)).tolist() if hz != usual)]
+
+
+def _leakage_at(campaign: ObservedSite, name: str, modulation_hz: float) -> Parameter:
+    usual = modulation_hz == campaign.site.ranging.modulation_hz
+    return Parameter(ParameterKind.LEAKAGE, name, "" if usual else f"at {megahertz(modulation_hz)}")
+
+
+def _leakages_of(campaign: ObservedSite, name: str) -> list[Parameter]:
+    """Residual leakages of a ranger, one a modulation frequency, as each was calibrated by itself."""
+    return [_leakage_at(campaign, name, hz) for hz in _modulations(campaign, name)]
+
+
+def leakage_quantities(campaign: ObservedSite, name: str, shots: np.ndarray) -> list[Parameter]:
+    """Residual leakage of each of a ranger's shots (m,), by their index."""
+    return [_leakage_at(campaign, name, hz) for hz in campaign.modulation_of(shots).tolist()]
 
 
 def _head(campaign: ObservedSite, name: str, layout: UnknownsLayout) -> Linear:
@@ -634,9 +756,9 @@ def _triplet(
             np.concatenate([layout.columns(ball), layout.columns(left_prism), layout.columns(right_prism)]),
             np.hstack([eye, -0.5 * eye, -0.5 * eye]),
         ),
-        _length("triplet spacings", length, u_d12, layout, left_prism, right_prism),
+        _length(TRIPLET_SPACINGS, length, u_d12, layout, left_prism, right_prism),
         Linear(
-            "triplet axes",
+            TRIPLET_AXES,
             np.zeros(2),
             (length * settings.u_plate_normal) ** 2 * np.eye(2),
             np.concatenate([layout.columns(left_prism), layout.columns(right_prism)]),

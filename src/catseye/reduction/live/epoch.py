@@ -22,19 +22,20 @@ from catseye.records.site.folder import SiteFolder
 from catseye.records.site.triplet import TripletRecord
 from catseye.reduction.epoch.allowance import Allowance
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates, coordinates_of
-from catseye.reduction.epoch.cycles import Resolved, resolve_cycles, without_shots
+from catseye.reduction.epoch.lines.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.parameter import Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import Phases, follow_electronics
 from catseye.reduction.epoch.reason import Reason
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.settling import SettledNetwork, allowed, iterate_adjustment, refuted_priors
+from catseye.reduction.epoch.settling import SettledNetwork, allowed, iterate_adjustment
 from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 from catseye.reduction.live.shots import PhasedShot
 from catseye.reduction.live.state import Carried, from_ground, to_ground, update_correlated
 from catseye.reduction.live.thermometers import SuspectedBias, biases_of, prior_pulls, with_suspected_biases
-from catseye.reduction.site.motion import TelescopeCarrier, ground_from
+from catseye.reduction.site.motion import GROUND, TelescopeCarrier
 
 SHARED_BY_AN_EPOCH = (
+    ParameterKind.RECORD,
     ParameterKind.ELECTRONICS,
     ParameterKind.REPEATS,
     ParameterKind.BODY,
@@ -164,11 +165,11 @@ def solve_epoch(
     if not network.rangers:
         raise InputError("no usable shot in this epoch (expected a phase, a reference and a position for at least one)")
     settled = _judged(network, network_with, resolved.starts, predicted=state is not None)
-    refuted = frozenset(p.of for p in refuted_priors(settled) if p.kind is ParameterKind.THERMOMETER)
+    refuted = frozenset(p.of for p in settled.network.allowance.refuted if p.kind is ParameterKind.THERMOMETER)
     biases = biases_of(settled.network.field, settled.solution, settled.network.layout.air)
     settled = _with_suspicions(settled, biases, opened=opened, refuted=refuted)
     network, frames = settled.network, frames_at(settled.network, motion)
-    solution, coordinates = settled.solution, coordinates_of(settled, resolved=resolved)
+    solution, coordinates = settled.solution, coordinates_of(settled, resolved=resolved, with_records=False)
     reasons |= resolved.rejected
     layout = network.layout
     lasts = np.array(
@@ -236,8 +237,10 @@ def frames_at(network: CampaignNetwork, motion: TelescopeCarrier) -> dict[str, T
 def frames_of_points(motion: TelescopeCarrier, names: Sequence[str]) -> dict[str, Transform]:
     """Ground from the frame of each moving point."""
     azimuth, elevation = motion.track.at(motion.epoch)
-    kinds = {f: ground_from(motion.site, f, azimuth, elevation).single for f in ("alidade", "reflector")}
-    return {name: kinds[motion.frames[name]] for name in names if motion.frames.get(name) in kinds}
+    moving = [name for name in names if motion.frames.get(name, GROUND) != GROUND]
+    one_of = {motion.body(name): name for name in moving}
+    bodies = {body: motion.ground_from(name, azimuth, elevation).single for body, name in one_of.items()}
+    return {name: bodies[motion.body(name)] for name in moving}
 
 
 def _persists(parameter: Parameter, tracked: Sequence[str], triplets: Mapping[str, TripletRecord]) -> bool:

@@ -13,13 +13,14 @@ from catseye.errors import InputError
 from catseye.records.files.columns import columns_of
 from catseye.records.files.reading import Folder
 from catseye.records.files.verdicts import PROVENANCE
-from catseye.records.network.solved_points import FILE, SolvedPoints, read_solved_points
+from catseye.records.network.solved_points import FILE, SolvedPoints, read_points, read_solved_points
 from catseye.records.network.written_pose import FILE as POSE_FILE
 from catseye.reduction.structure.group import PlacesEpoch
 from catseye.verdict import Verdict
 
 REQUIRED = ("reduction", "azimuth_deg", "elevation_deg")
 OPTIONAL = ("temperature_c", "mjd_utc")
+TABLE = ".csv"  # of points, as docs/formats/surface.md has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,8 @@ def read_epochs(sources: Sequence[Path | SolvedPoints], listed: Path | None = No
 
     sources   output directories of `catseye reduce`, or directories of these; coordinates.json files; solved points
     listed    CSV with the columns reduction, azimuth_deg, elevation_deg and optionally temperature_c and mjd_utc: a
-              directory or file, relative to it, and the telescope's position; it overrides the files'
+              directory or file (also a CSV table of points), relative to it, and the telescope's position; it
+              overrides the files'
 
     Raises InputError for a file that is missing, not a reduction, or without posture.
     """
@@ -97,7 +99,10 @@ def _epoch(place: Path, numbers: Mapping[str, float], inputs: dict[str, str], la
     """Epoch of one reduction's file, with its posture."""
     numbers = dict(numbers)
     try:
-        solved = read_solved_points(place, averaged=False)
+        table = place.suffix.lower() == TABLE
+        solved = read_points(place) if table else read_solved_points(place, averaged=False)
+        if table and not np.any(solved.block(solved.names)):
+            raise InputError(f"{place.name}: its points have no uncertainty (expected u_mm, or u_x_mm, u_y_mm, u_z_mm)")
         hashes = dict(solved.hashes)
         if "azimuth_deg" in numbers:
             hashes.pop(POSE_FILE, None)  # the list's posture counts

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import text
 
-from catseye.constants import DEGREE
-from catseye.coordinator.clients.samplers import triangles_of
 from catseye.coordinator.journal.entries import EPOCH_RANGES
+from catseye.coordinator.samplers.rings import triangles_of
 from catseye.errors import InputError
 from catseye.reduction.epoch.reason import status_of
 from catseye.service.watch.entries import COVARIANCE, Object, epoch_summary, number, numbers, words
@@ -294,30 +293,18 @@ def surface_object(record: EpochRecord, site: SiteMap) -> Object:
     """
     from catseye.errors import EstimationError
     from catseye.optics.zernike import number as term_number
-    from catseye.reduction.surface.dish import DishDesign
-    from catseye.reduction.surface.findings import reduce_surface
-    from catseye.reduction.surface.prisms import EpochPlace, prisms_of_points
-    from catseye.reduction.surface.shape import ShapeSettings
+    from catseye.reduction.surface.epoch_surface import dish_rows, epoch_surface
 
     names, places = record.places()
     records = site.site
-    rows = [k for k, n in enumerate(names) if n in records.targets and records.targets[n].shapes_dish]
     covariance = record.covariance
-    if covariance is None or not rows:
+    if covariance is None or not dish_rows(names, records):
         return _no_surface(record, "no prism of the dish has a covariance")
-    at = (3 * np.array(rows)[:, None] + np.arange(3)).ravel()
-    dish = DishDesign.of_site(records)
-    posture = (record.answer["azimuth"] / DEGREE, record.answer["elevation"] / DEGREE)
-    prisms = prisms_of_points(
-        places[rows],
-        covariance[np.ix_(at, at)],
-        [names[k] for k in rows],
-        dish,
-        EpochPlace("ground", *posture, None),
-        source=f"epoch {record.number}",
-    )
+    posture = (record.answer["azimuth"], record.answer["elevation"])
     try:
-        result = reduce_surface([prisms], dish, ShapeSettings())
+        result = epoch_surface(
+            names, places, covariance, site=records, posture=posture, source=f"epoch {record.number}"
+        )
     except EstimationError as problem:
         return _no_surface(record, f"no shape of the dish: {problem}")
     shape = result.shapes[0]

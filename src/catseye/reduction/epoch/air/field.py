@@ -313,7 +313,7 @@ class AirField:
         k = int(np.argmax(apart))
         readings = "; ".join(
             f"{name} {t:.1f} °C, {p:.1f} hPa, {h:.0f} %"
-            + (f", by the ranges {offset:+.1f} °C too warm" if abs(offset) > MUCH_C else "")
+            + (f", by the ranges {offset:+.1f} °C too warm{_unit_of(t, offset)}" if abs(offset) > MUCH_C else "")
             for name, (t, p, h), offset in zip(self.stations, state[k], offsets, strict=True)
         )
         return (
@@ -426,6 +426,16 @@ class _Nodes:
         return _Nodes(
             z=z, east=east, north=north, zeta=zeta, share=share, profile=profile, weight=nodes_along(0.0, 1.0, NODES)[1]
         )
+
+
+def _unit_of(reading_c: float, offset_c: float) -> str:
+    """Unit of a reading that is too warm by as much as degrees Fahrenheit are.
+
+    >>> _unit_of(13.8, 23.8), _unit_of(13.8, 10.0)
+    (': looks like degrees Fahrenheit', '')
+    """
+    fahrenheit = abs(offset_c - (reading_c - (reading_c - 32.0) / 1.8)) < MUCH_C
+    return ": looks like degrees Fahrenheit" if fahrenheit else ""
 
 
 @dataclass(frozen=True, eq=False)

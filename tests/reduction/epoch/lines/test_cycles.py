@@ -8,8 +8,8 @@ import pytest
 from catseye.errors import InputError
 from catseye.records.site.target import TargetRow
 from catseye.reduction.epoch.coordinates import adjust_coordinates
-from catseye.reduction.epoch.cycles import doubtful_points, resolve_cycles
 from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.lines.cycles import doubtful_points, resolve_cycles
 from catseye.reduction.epoch.settings import ReductionSettings
 from catseye.reduction.epoch.unknowns import build_network
 from catseye.reduction.site.places import places_of

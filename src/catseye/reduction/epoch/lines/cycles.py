@@ -7,7 +7,8 @@ make others safe. Points that are still too uncertain are searched for jointly f
 then points that only these have seen. A point without an answer is refused.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,21 +17,20 @@ from catseye.constants import MILLIMETRE, SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityStatus, Located
 from catseye.estimation.least_squares.adjustment import (
     NONCENTRALITY,
-    GroupFit,
-    LeastSquaresSolution,
     SolverSettings,
     adjust,
 )
 from catseye.estimation.least_squares.robust import OutlierSearch, adjust_robustly
-from catseye.estimation.least_squares.rows import full_jacobian
 from catseye.estimation.observations.kinds import ObservationGroup
-from catseye.reduction.epoch.cycle_search import CycleScene, search, spread
+from catseye.reduction.epoch.lines.cycle_search import CycleScene, search, spread
+from catseye.reduction.epoch.lines.frequency_cycles import FrequencyCycles
 from catseye.reduction.epoch.parameter import ParameterKind
+from catseye.reduction.epoch.prior_names import THERMOMETERS, ZEROS
 from catseye.reduction.epoch.ranges import ElectronicsPhase
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.shots import ShotGroup, shot_group
-from catseye.reduction.epoch.unknowns import THERMOMETERS, ZEROS, CampaignNetwork, build_network
+from catseye.reduction.epoch.shots import shot_group
+from catseye.reduction.epoch.unknowns import CampaignNetwork, build_network
 
 REQUIRED_SIGMAS = 5.0  # standard uncertainties of misfit that the margin must hold
 ROUNDED = 1.01  # the layout's 15 mm in space are 8.7 mm a coordinate; its rounded 10 mm pass, being 1 in 1000 too large
@@ -45,22 +45,30 @@ class Resolved:
     starts     point: (3,) m, start of the adjustment instead of the typed position
     rejected   index into the campaign's shots: reason that its whole cycles are unknown
     notes      one line per point
+    doubtful   points that may be wrong by whole half wavelengths
+    frequencies   whole cycles by several modulation frequencies
     """
 
     starts: dict[str, np.ndarray]
     rejected: dict[int, Reason]
     notes: tuple[str, ...]
+    doubtful: frozenset[str] = frozenset()
+    frequencies: FrequencyCycles = field(default_factory=FrequencyCycles)
 
 
-def resolve_cycles(network: CampaignNetwork, progress: Progress | None = None) -> Resolved:
+def resolve_cycles(
+    network: CampaignNetwork, progress: Progress | None = None, *, starts: Mapping[str, np.ndarray] | None = None
+) -> Resolved:
     """Better starts for badly typed points.
 
     Also the shots on them whose whole cycles stay unknown.
 
     network    of all shots that have a phase
     progress   called with (task, number done, total)
+    starts     (3,) m of points that are known better than as typed
 
-    Nothing happens where every typed position keeps five standard uncertainties within a quarter wavelength.
+    Shots whose whole cycles `network.phases` knows are safe. Nothing happens where every typed position keeps five
+    standard uncertainties within a quarter wavelength.
     Raises EstimationError where the safe shots alone find no answer.
 
     Source: the law of `signal.cycles.whole`; search by [TEUNISSEN95], see `estimation.ambiguity.search`.
@@ -70,10 +78,13 @@ def resolve_cycles(network: CampaignNetwork, progress: Progress | None = None) -
     if not doubtful:
         return Resolved({}, {}, ())
     ends = {int(k): {name, targets[k]} for name, e in network.electronics.items() for k in e.shots}
-    waiting = {k for k, names in ends.items() if names & doubtful}
+    cycles = network.phases.cycles
+    waiting = {k for k, names in ends.items() if names & doubtful and (cycles is None or cycles[k] < 0)}
     if not waiting:
         return Resolved({}, {}, ())
     x = np.array(network.layout.start)
+    for name in (starts or {}).keys() & network.places.keys():
+        x[network.layout.columns(name)] = (starts or {})[name]
     candidates = frozenset(doubtful)
     last: dict[str, Located] = {}
     found_as: dict[str, Located] = {}
@@ -140,63 +151,6 @@ def without_shots(electronics: dict[str, ElectronicsPhase], out: set[int]) -> di
         keep = np.array([int(k) not in out for k in e.shots], dtype=bool)
         remaining[name] = e.of(keep)
     return remaining
-
-
-def line_errors(
-    group: ShotGroup, targets: tuple[str, ...], fit: GroupFit, *, solution: LeastSquaresSolution
-) -> tuple[np.ndarray, np.ndarray]:
-    """Error of each shot's range by all other lines, and its u.
-
-    Optical metres. Used repeats on one line come from one coarse length, so that their whole cycles are wrong
-    together: their common error is e'Pv / e'P_v e, e being 1 for them, as `adjust` has it for a single shot.
-    """
-    error, u = fit.estimated_error.copy(), fit.detectable_error / NONCENTRALITY
-    on = np.flatnonzero(fit.active)
-    line = np.unique(np.array(targets)[on], return_inverse=True)[1] if len(on) else on
-    repeats = np.bincount(line) if len(on) else on
-    if not (repeats > 1).any():
-        return error, u
-    if group.covariance.ndim == 1:
-        _apart_line_errors(group, on[np.argsort(line, kind="stable")], repeats, fit, solution, error=error, u=u)
-        return error, u
-    weight = np.linalg.inv(group.covariance[np.ix_(on, on)])
-    weighed = weight @ full_jacobian(group, solution.x)[on]
-    weighted_residual = weight @ fit.residual[on]
-    for one in np.flatnonzero(repeats > 1):
-        mine = line == one
-        weight_sum, gradient = weight[np.ix_(mine, mine)].sum(), weighed[mine].sum(axis=0)
-        visible = max(weight_sum - gradient @ solution.covariance @ gradient, 1e-12 * weight_sum)
-        error[on[mine]], u[on[mine]] = weighted_residual[mine].sum() / visible, visible**-0.5
-    return error, u
-
-
-def _apart_line_errors(
-    group: ShotGroup,
-    rows: np.ndarray,
-    repeats: np.ndarray,
-    fit: GroupFit,
-    solution: LeastSquaresSolution,
-    *,
-    error: np.ndarray,
-    u: np.ndarray,
-) -> None:
-    """`line_errors` of independent rows, so many per line.
-
-    Errors and u are changed in place.
-    """
-    jacobian = group.predict(solution.x)[1]
-    first = np.cumsum(repeats) - repeats
-    for count in np.unique(repeats[repeats > 1]):
-        mine = rows[first[repeats == count][:, None] + np.arange(count)]
-        weight = 1.0 / group.covariance[mine]
-        columns = group.columns[mine].reshape(len(mine), -1)
-        gradient = (jacobian[mine] * weight[..., None]).reshape(len(mine), -1)
-        weight_sum = weight.sum(axis=1)
-        visible = np.maximum(
-            weight_sum - np.sum(solution.q.products(columns, gradient) * gradient, axis=1), 1e-12 * weight_sum
-        )
-        error[mine] = (np.sum(weight * fit.residual[mine], axis=1) / visible)[:, None]
-        u[mine] = visible[:, None] ** -0.5
 
 
 def _too_wide(network: CampaignNetwork, covariance: np.ndarray) -> bool:
@@ -269,9 +223,9 @@ def _safe(scene: CycleScene, waiting: set[int]) -> set[int]:
 
     All the others predict their range well enough.
     """
-    half = 0.5 * SPEED_OF_LIGHT / scene.network.campaign.site.ranging.modulation_hz
     safe = set()
     for fit, part in zip(scene.solution.fits, scene.parts, strict=False):
+        half = scene.network.campaign.half_wavelengths(part.electronics.shots)
         u = fit.detectable_error / NONCENTRALITY
         misfit = fit.estimated_error - half * np.rint(fit.estimated_error / half)  # cycles belong to an older place
         resolved = np.abs(misfit) + REQUIRED_SIGMAS * u < 0.5 * half
@@ -289,16 +243,17 @@ def _found_notes(network: CampaignNetwork, settings: ReductionSettings, located:
         least = min(located, key=lambda name: located[name].discrimination)
         return [
             f"{len(located)} points too uncertain for the nearest integer: whole cycles found jointly; least certain "
-            f"{least}, {_next(located[least])}"
+            f"{least}, {next_candidate(located[least])}"
         ]
     return [
         f"{name}: position uncertain by {_u_mm(network, settings, name):.0f} mm; whole cycles found "
-        f"jointly from {len(one.cycles)} shots{', one of them left out' * (one.left_out >= 0)}, {_next(one)}"
+        f"jointly from {len(one.cycles)} shots{', one of them left out' * (one.left_out >= 0)}, {next_candidate(one)}"
         for name, one in sorted(located.items())
     ]
 
 
-def _next(located: Located) -> str:
+def next_candidate(located: Located) -> str:
+    """Distance of the second best set of whole cycles, in words."""
     if not np.isfinite(located.discrimination):
         return "no other candidate"
     return f"next candidate at least {np.sqrt(located.discrimination):.0f} sigma worse"

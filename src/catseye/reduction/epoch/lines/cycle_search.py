@@ -9,7 +9,6 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array
 
-from catseye.constants import SPEED_OF_LIGHT
 from catseye.estimation.ambiguity.search import AmbiguityLimits, AmbiguityStatus, Located, locate
 from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.rows import full_jacobian
@@ -89,6 +88,7 @@ class _Problem:
     periods        (r,) m, half wavelengths in air
     covariance     (r, r) m^2: the shots' noise and the uncertainty of everything but this point
     u_glass        (r,) m, of dPc by the uncertain direction
+    line           (r,) number of the line: repeats on one do not check each other
     """
 
     start: np.ndarray
@@ -98,6 +98,7 @@ class _Problem:
     periods: np.ndarray
     covariance: np.ndarray
     u_glass: np.ndarray
+    line: np.ndarray
 
     def located(self, chosen: np.ndarray, *, wider: bool) -> Located:
         covariance = self.covariance + (np.diag(self.u_glass**2) if wider else 0.0)
@@ -131,7 +132,8 @@ def _problem(scene: CycleScene, name: str, x: np.ndarray) -> _Problem:
     prior = spread(scene, name)
     u_place = float(np.sqrt(np.linalg.eigvalsh(prior)[-1]))
     turn = np.concatenate([_by_direction(network, part) for _, part in pairs])
-    half = 0.5 * SPEED_OF_LIGHT / network.campaign.site.ranging.modulation_hz
+    half = np.concatenate([network.campaign.half_wavelengths(part.electronics.shots) for _, part in pairs])
+    lines = [f"{part.name} {target}" for _, part in pairs for target in part.target]
     return _Problem(
         start=solution.x[columns],
         prior=prior,
@@ -140,6 +142,7 @@ def _problem(scene: CycleScene, name: str, x: np.ndarray) -> _Problem:
         periods=half / n,
         covariance=covariance,
         u_glass=np.abs(turn) * u_place / distance,
+        line=np.unique(lines, return_inverse=True)[1],
     )
 
 
@@ -165,7 +168,7 @@ def _by_direction(network: CampaignNetwork, part: ShotParts) -> np.ndarray:
 
 
 def _best_shots(problem: _Problem, available: np.ndarray) -> np.ndarray:
-    """Up to RANGES of the available shots, greedily the most informative."""
+    """Up to RANGES of the available shots, one a line, greedily the most informative."""
     towards = problem.stations - problem.start
     e = towards / np.linalg.norm(towards, axis=1)[:, None]
     noise = np.diag(problem.covariance)
@@ -174,8 +177,9 @@ def _best_shots(problem: _Problem, available: np.ndarray) -> np.ndarray:
     candidates = [int(i) for i in available]
     while candidates and len(chosen) < RANGES:
         gain = np.array([e[i] @ covariance @ e[i] / noise[i] for i in candidates])
-        best = candidates.pop(int(np.argmax(gain)))
+        best = candidates[int(np.argmax(gain))]
         reach = covariance @ e[best]
         covariance = covariance - np.outer(reach, reach) / (noise[best] + e[best] @ reach)
         chosen.append(best)
+        candidates = [i for i in candidates if problem.line[i] != problem.line[best]]
     return np.array(sorted(chosen))

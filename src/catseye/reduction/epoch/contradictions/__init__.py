@@ -1,0 +1,1 @@
+"""Contradictions between records and ranges, and the records that explain them."""

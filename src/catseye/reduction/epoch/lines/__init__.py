@@ -1,0 +1,1 @@
+"""Lines of a network: whole cycles, tests of each line, and points that nothing checks."""

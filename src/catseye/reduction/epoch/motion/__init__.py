@@ -1,0 +1,1 @@
+"""Motion of the telescope during a campaign: its expansion, and bodies that sway."""

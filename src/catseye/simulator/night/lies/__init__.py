@@ -1,0 +1,1 @@
+"""Lies of a night: records that are wrong, and nature that the model of the reduction does not have."""

@@ -1,0 +1,196 @@
+"""Every record is tested by everything else; a wrong one is named, or is among those that explain the misfit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from catseye.constants import MILLIMETRE, PPM
+from catseye.estimation.least_squares.adjustment import adjust
+from catseye.reduction.epoch.contradictions.contradiction import RecordGroup
+from catseye.reduction.epoch.contradictions.hypotheses import DIRECTIONS, RecordKey, widened
+from catseye.reduction.epoch.coordinates import adjust_coordinates, settled_network
+from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.record_tests import EpochRecords, record_tests
+
+
+def with_record(campaign, part, name, **values):
+    table = dict(getattr(campaign, part))
+    table[name] = table[name].model_copy(update=values)
+    return replace(campaign, **{part: table})
+
+
+def adjusted(campaign, reduced):
+    return adjust_coordinates(campaign, reduced.phases, reduced.electronics, settings=reduced.settings)
+
+
+@pytest.fixture(scope="module")
+def records(few_01, reduced_few_01):
+    r = reduced_few_01
+    settled, _ = settled_network(few_01, r.phases, r.electronics, settings=r.settings)
+    return EpochRecords(*settled)
+
+
+def test_an_honest_night_contradicts_no_record(reduced_few_01):
+    coordinates = reduced_few_01.coordinates
+    assert coordinates.contradictions == ()
+    groups = {g.group: g for g in coordinates.groups}
+    assert {RecordGroup.MONUMENTS, RecordGroup.ZEROS, RecordGroup.BENCHMARKS, RecordGroup.MODULATION} <= groups.keys()
+    assert min(g.probability for g in coordinates.groups) > 1e-3
+    w = np.array([row.w for row in coordinates.records if row.group is not RecordGroup.POSITIONS])
+    w = w[np.isfinite(w)]
+    assert len(w) > 150
+    assert 0.5 < np.sqrt(np.mean(w**2)) < 1.5  # they are not independent
+    assert np.abs(w).max() < 4.0
+
+
+def test_the_error_of_a_record_is_what_the_others_say_of_it(records):
+    """Against an adjustment without the record: its value less what comes out, by their variances."""
+    rows, _ = record_tests(records)
+    network, solution, _ = records.network, records.solution, records.shots
+    tested = 0
+    for h in records.of_priors:
+        if h.key not in {
+            RecordKey(RecordGroup.MONUMENTS, "ZY104"),
+            RecordKey(RecordGroup.ZEROS, "ZY113"),
+            RecordKey(RecordGroup.BENCHMARKS, "ZY104 ZBM02"),
+        }:
+            continue
+        ((i, (at, change)),) = h.priors.items()
+        for k in range(len(h.parts)):
+            alone = (at[change[:, k] != 0.0], np.eye(1))
+            loose = widened(network.priors[i], alone, np.array([10.0]))
+            groups = list(records.groups)
+            groups[len(records.shots) + i] = loose
+            free, active = np.array(network.layout.free), [f.active for f in solution.fits]
+            again = adjust(solution.x, groups, free=free, active=active)
+            fit = again.fits[len(records.shots) + i]
+            (row,) = (r for r in rows if r.record == h.record and r.part == h.parts[k])
+            (at_row,) = alone[0]
+            expected = float(fit.residual[at_row]) / h.per_unit
+            assert row.error == pytest.approx(expected, abs=1e-3 * row.u_error)
+            jacobian = network.priors[i].predict(again.x)[1]
+            columns = network.priors[i].columns
+            columns = columns if columns.ndim == 1 else columns[at_row]
+            along = jacobian[at_row]
+            used = along != 0.0
+            predicted = along[used] @ again.q.within(columns[used]) @ along[used]
+            assert row.u_error == pytest.approx(np.sqrt(predicted + (row.u * h.per_unit) ** 2) / h.per_unit, rel=1e-3)
+            tested += 1
+    assert tested == 5
+
+
+def test_a_certificate_a_millimetre_long_is_not_blamed_on_a_zero(few_01, reduced_few_01):
+    first, *others = few_01.benchmarks
+    longer = first.model_copy(update={"certified_distance_mm": first.certified_distance_mm + 1.0})
+    found = adjusted(replace(few_01, benchmarks=(longer, *others)), reduced_few_01)
+    (contradiction,) = found.contradictions
+    groups = {e.group for e in contradiction.explanations}
+    assert RecordGroup.BENCHMARKS in groups
+    assert RecordGroup.ZEROS not in groups
+    certificate = next(e for e in contradiction.explanations if e.group is RecordGroup.BENCHMARKS)
+    assert certificate.errors[0] == pytest.approx(1.0, abs=4.0 * certificate.u[0])
+    assert "certified_distance_mm" in certificate.text
+    assert any(contradiction.text in doubt for doubt in found.doubts)
+
+
+@pytest.mark.parametrize("ranger", ["ZY113", "ZY117"])
+def test_a_wrong_zero_of_a_ranger_with_many_lines_is_named_alone(few_01, reduced_few_01, ranger):
+    zp = few_01.mirror_of(ranger).zp
+    found = adjusted(with_record(few_01, "mirrors", zp, d0_mm=few_01.mirrors[zp].d0_mm + 0.5), reduced_few_01)
+    (contradiction,) = found.contradictions
+    assert contradiction.named is not None
+    assert (contradiction.named.group, contradiction.named.of) == (RecordGroup.ZEROS, ranger)
+    assert abs(contradiction.named.errors[0] - 0.5) < 4.0 * contradiction.named.u[0]
+    usual = reduced_few_01.coordinates
+    assert np.all(np.abs(found.x - usual.x) <= 3.0 * found.u)
+    assert np.array_equal(found.ranges.used, usual.ranges.used)
+
+
+def test_a_frequency_is_one_explanation_of_a_common_scale(few_01, reduced_few_01):
+    """5 ppm too high: half wavelengths too short. All thermometers and the pressure change lengths alike."""
+    ranging = few_01.site.ranging
+    faster = ranging.model_copy(update={"modulation_hz": ranging.modulation_hz * (1.0 + 5.0 * PPM)})
+    campaign = replace(few_01, site=few_01.site.model_copy(update={"ranging": faster}))
+    found = adjusted(campaign, reduced_few_01)
+    (contradiction,) = found.contradictions
+    errors = {(e.group, e.of): e.errors[0] for e in contradiction.explanations}
+    assert errors[RecordGroup.MODULATION, ""] == pytest.approx(5.0, abs=1.5)
+    assert errors[RecordGroup.PRESSURE, ""] == pytest.approx(5.0 / 0.27, abs=6.0)  # 0.27 ppm a hPa
+    assert contradiction.named is None
+
+
+def test_two_monuments_are_two_contradictions(few_01, reduced_few_01):
+    """Each with its mirror's offset, which is the same vector."""
+    campaign = few_01
+    for name in ("ZY102", "ZY108"):
+        campaign = with_record(campaign, "monuments", name, x_mm=few_01.monuments[name].x_mm + 2.0)
+    found = adjusted(campaign, reduced_few_01)
+    named = [{e.of for e in c.explanations} for c in found.contradictions]
+    assert {"ZY102"} in named
+    assert {"ZY108"} in named
+    assert all(owners <= {"ZY102", "ZY108"} for owners in named)
+    for contradiction in found.contradictions:
+        (place,) = (e for e in contradiction.explanations if e.group is RecordGroup.MONUMENTS)
+        east = place.errors[place.parts.index("east")]
+        assert east == pytest.approx(2.0, abs=4.0 * place.u[place.parts.index("east")] + 0.1)
+
+
+def test_a_drifting_feed_arm_is_a_movement(few_01, reduced_few_01):
+    """2 mm/h upwards, written into the phases of shots from the ground; the arm's rangers see the dish sink."""
+    r, shots = reduced_few_01, few_01.shots
+    c = r.coordinates
+    arm = {n for n, p in c.places.items() if p.body == "arm"}
+    hours = (shots.mjd_utc - 0.5 * (shots.mjd_utc.min() + shots.mjd_utc.max())) * 24.0
+    turn = np.zeros(len(hours))
+    per_metre = -4.0 * np.pi * few_01.site.ranging.modulation_hz / 299792458.0
+    for k, (a, b) in enumerate(zip(shots.ranger, shots.target, strict=True)):
+        if b in c.places and (a in arm) != (b in arm):
+            line = c.x[c.index(b)] - c.x[c.index(a)]
+            along = line[2] / np.linalg.norm(line) * (1.0 if b in arm else -1.0)
+            turn[k] = per_metre * 2.0 * MILLIMETRE * hours[k] * along
+    phases = replace(r.phases, phasor=r.phases.phasor * np.exp(1j * turn))
+    found = adjust_coordinates(few_01, phases, r.electronics, settings=r.settings)
+    moved = [e for contradiction in found.contradictions for e in contradiction.explanations if e.of == "arm"]
+    assert moved
+    assert moved[0].parts == DIRECTIONS
+    up = moved[0].errors[2]
+    assert up == pytest.approx(2.0, abs=max(5.0 * moved[0].u[2], 0.5))
+    assert "the feed arm" in moved[0].record
+
+
+def test_a_zero_of_30_mm_is_named_though_whole_cycles_move_with_it(few_01):
+    """Beyond a quarter wavelength of 50 mm each shot's nearest cycle is another one; the search leaves the zero out."""
+    zp = few_01.mirror_of("ZY105").zp
+    found = reduce_epoch(with_record(few_01, "mirrors", zp, d0_mm=few_01.mirrors[zp].d0_mm + 30.0))
+    (contradiction,) = found.coordinates.contradictions
+    assert contradiction.named is not None
+    assert (contradiction.named.group, contradiction.named.of) == (RecordGroup.ZEROS, "ZY105")
+    assert contradiction.named.errors[0] == pytest.approx(30.0, abs=0.5)
+    assert found.verdict.word == "doubtful"
+    assert found.verdict.why.startswith("ZY105's zero is not the sheet's: its ranges imply -29.9")
+
+
+def test_four_lies_at_once_are_four_contradictions(night_01, reduced_night_01):
+    first, *others = night_01.benchmarks
+    longer = first.model_copy(update={"certified_distance_mm": first.certified_distance_mm + 1.0})
+    taller = {n: t.model_copy(update={"h_corr_mm": t.h_corr_mm + 0.3}) for n, t in night_01.triplets.items()}
+    campaign = replace(night_01, benchmarks=(longer, *others), triplets=taller)
+    zp = night_01.mirror_of("ZY108").zp
+    campaign = with_record(campaign, "mirrors", zp, d0_mm=night_01.mirrors[zp].d0_mm + 1.0)
+    campaign = with_record(campaign, "monuments", "ZY103", x_mm=night_01.monuments["ZY103"].x_mm + 1.0)
+    found = adjusted(campaign, reduced_night_01)
+    explained = [{(e.group, e.of) for e in c.explanations} for c in found.contradictions]
+    assert len(explained) == 4
+    for lie in (
+        (RecordGroup.BENCHMARKS, "ZY102 ZBM01"),
+        (RecordGroup.ZEROS, "ZY108"),
+        (RecordGroup.MONUMENTS, "ZY103"),
+        (RecordGroup.TRIPLETS, ""),
+    ):
+        assert sum(lie in owners for owners in explained) == 1
+    arm = [found.index(f"ZY{k}") for k in range(113, 119)]
+    before = [reduced_night_01.coordinates.index(f"ZY{k}") for k in range(113, 119)]
+    moved = found.x[arm] - reduced_night_01.coordinates.x[before]
+    assert np.abs(moved).max() < 0.3e-3
+    assert np.all(np.abs(moved) < 2.0 * found.u[arm])
