@@ -51,6 +51,7 @@ class ListLive:
 
     def __init__(self, **verdicts):
         self.fed, self.verdicts, self.epochs, self.pending = [], verdicts, 0, []
+        self.changes = []
 
     def weather(self, read):
         self.fed.append(read)
@@ -69,6 +70,10 @@ class ListLive:
         return Answer(self.epochs, ticks, used=used)
 
     failed = ""
+    bending = None  # a rigid telescope
+
+    def change(self, change):
+        self.changes.append(change)
 
     def begin(self, ticks):
         return SimpleNamespace(solve=partial(self.solve, ticks))

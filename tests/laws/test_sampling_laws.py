@@ -16,7 +16,7 @@ from catseye.signal.detection.sampling import (
     tone_response,
 )
 from catseye.signal.detection.spectral import bin_phasor, strongest_tone
-from catseye.signal.detection.zero_crossing import crossing_phase, phase_between
+from catseye.signal.detection.zero_crossing import crossing_phase
 
 phases = st.floats(0.0, 2 * np.pi, exclude_max=True)
 per_cycle = st.integers(3, 40)
@@ -116,14 +116,6 @@ def test_the_average_of_both_edges_forgives_any_clipping_of_a_pure_wave(top, bot
         # corners of the clipped wave fall between points: 1e-6 of its mean
         assert turned(found.rising, phase + np.arcsin(level)) <= 1e-6
         assert turned(found.falling, phase - np.arcsin(level)) <= 1e-6
-
-
-@given(st.floats(9.3, 40.0), st.floats(3.5, 20.0), phases, phases, st.floats(0.1, 10.0))
-def test_two_channels_need_no_known_frequency(period, turns, phase, reference, size):
-    t = np.arange(int(period * turns) + 2) / period
-    found = phase_between(size * np.cos(2 * np.pi * t - phase), np.cos(2 * np.pi * t - reference))
-    # straight lines between as few as nine samples a cycle, and the means over broken cycles
-    assert turned(found.phase, phase - reference) <= 0.02
 
 
 @settings(max_examples=50)

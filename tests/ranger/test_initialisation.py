@@ -13,8 +13,6 @@ from catseye.ranger.initialisation import (
     SiteCommands,
     commands_of_ranger,
     cube_numbers,
-    cube_places_mm,
-    cubes_commands,
     dish_centre,
     frame_of,
     head_commands,
@@ -91,7 +89,8 @@ def test_feed_arm_ranger_uses_the_reflector_frame(gbt):
         assert frame_of(gbt, record.name) == "reflector"
         station = local_station(gbt, record.name)
         assert np.allclose(station.scan_point / MILLIMETRE, record.nominal_scan_point_mm, atol=1e-6)
-        place = cube_places_mm(gbt, record.name)["DP20C"]
+        commands = SiteCommands(gbt).of_cubes(record.name, ["DP20C"])
+        place = np.array([float(v) for v in next(c for c in commands if c.command == "COO").parameters[1:4]])
         assert np.allclose(place, gbt.targets["DP20C"].position_mm, atol=1e-6)
         found = aim(station, place * MILLIMETRE)
         line = ray(station, [float(found.azimuth_counts), float(found.elevation_counts)])
@@ -125,7 +124,7 @@ def test_cube_numbers_are_common_and_a_ranger_is_not_its_own_target(gbt):
     assert numbers["ZRG"] == 0
     assert sorted(numbers.values()) == list(range(len(gbt.target_names)))
     for name in ("ZY101", "ZY113"):
-        told = cubes_commands(gbt, name)
+        told = SiteCommands(gbt).of_cubes(name)
         assert told[0].parameters == (str(len(numbers) - 1),)
         placed = {r.parameters[4]: int(r.parameters[0]) for r in told if r.command == "COO"}
         assert placed == {n: k for n, k in numbers.items() if n not in ("ZRG", name)}
@@ -136,7 +135,9 @@ def test_prisms_have_constants_and_benchmarks_distances_on_their_ranger_only(gbt
     other = next(r for r in gbt.rangers if r != benchmark.ranger)
 
     def kinds(ranger):
-        return {int(r.parameters[0]): r.parameters[1:] for r in cubes_commands(gbt, ranger) if r.command == "KND"}
+        return {
+            int(r.parameters[0]): r.parameters[1:] for r in SiteCommands(gbt).of_cubes(ranger) if r.command == "KND"
+        }
 
     assert kinds(benchmark.ranger)[numbers[benchmark.target]] == ("B", f"{benchmark.certified_distance_mm:.4f}")
     assert kinds(other).get(numbers[benchmark.target], ("S",))[0] == "S"
@@ -149,10 +150,10 @@ def test_prisms_have_constants_and_benchmarks_distances_on_their_ranger_only(gbt
 
 
 def test_only_requested_targets_are_sent_and_unknown_ones_refused(gbt):
-    told = cubes_commands(gbt, "ZY101", ["ZRG", "DP20C", "ZY101", "ZY102"])
+    told = SiteCommands(gbt).of_cubes("ZY101", ["ZRG", "DP20C", "ZY101", "ZY102"])
     assert [r.parameters[4] for r in told if r.command == "COO"] == ["DP20C", "ZY102"]
     with pytest.raises(InputError, match="unknown target DP99X"):
-        cubes_commands(gbt, "ZY101", ["DP99X"])
+        SiteCommands(gbt).of_cubes("ZY101", ["DP99X"])
 
 
 def test_motion_settings_are_sent_in_a_valid_order(gbt):

@@ -60,6 +60,28 @@ def test_child_that_ignores_sigterm_is_killed_in_time():
     asyncio.run(story())
 
 
+def test_temporary_folder_of_a_killed_child_is_removed(tmp_path, monkeypatch):
+    """By either way of killing; a folder of another process stays."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    other = tmp_path / "catseye-0-x"
+    other.mkdir()
+
+    async def story():
+        for end in ("stop", "kill"):
+            one = child(DEAF)
+            await one.start()
+            left = tmp_path / f"catseye-{one.pid}-x"
+            (left / "deeper").mkdir(parents=True)
+            if end == "kill":
+                one.kill()
+                assert not left.exists()
+            await one.stop()
+            assert not left.exists()
+
+    asyncio.run(story())
+    assert list(tmp_path.iterdir()) == [other]
+
+
 def test_child_that_cannot_start_reports_its_own_message():
     async def story():
         with pytest.raises(InputError, match=r"^twin: port 5240 is taken$"):

@@ -16,6 +16,7 @@ from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import (
     CLOCK_CORRECTED,
     EPOCH_START,
+    LIVE_CHANGED,
     AnsweredShot,
     Document,
     Entry,
@@ -28,6 +29,7 @@ from catseye.coordinator.parts import TICKS_PER_SECOND, Clock, ticks_now
 from catseye.errors import CatseyeError, InputError
 from catseye.records.night.live import Happening, LivePosture, LiveShot, LiveWeather
 from catseye.reduction.epoch.reason import ShotStatus
+from catseye.reduction.live.changes import LiveChange
 from catseye.reduction.live.epoch import Epoch
 from catseye.reduction.live.live import EpochAnswer, EpochJob, Live
 
@@ -152,6 +154,15 @@ class Intake:
             why = "the clock was corrected meanwhile" if stale else self._live.failed
             self._event_log.tell("not-solved", f"the epoch was not solved: {why}", "warning" if stale else "alarm")
         return answer
+
+    def change(self, ticks: int, change: LiveChange) -> None:
+        """Change the reduction at this place of its input, and journal it: a replay changes there, too.
+
+        Raises InputError: impossible; nothing is changed.
+        """
+        self.flush()
+        self._live.change(change)
+        self._write((Document(ticks, LIVE_CHANGED, change.text),))
 
     def clock_jumped(self, since: int, until: int | None) -> None:
         """Reject shots overlapping two ticks; all later ones if the second is None."""

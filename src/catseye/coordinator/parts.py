@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from catseye.clock import Clock
 from catseye.constants import SECONDS_PER_DAY
+from catseye.geometry.frames.frame import Transforms
 from catseye.ranger.line import Reply, Request
 from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY, Happening, LivePosture
@@ -66,6 +67,8 @@ class SiteState:
     since_reference  s since each ranger's last good shot on ZRG; a ranger without one is absent
     place            a point's name and times (MJD) to (n, 3) m, ground frame: `Live.place`
     u                covariances (3, 3), m^2, of points as last estimated; may lack names
+    bent_frame       "arm" or "dish" and angles (n,), rad, to the transforms of its reflector frame to ground as a
+                     structural model bends it: `Live.bent_frame`; None of a rigid telescope
     """
 
     now_ticks: int
@@ -76,6 +79,7 @@ class SiteState:
     since_reference: dict[str, float]
     place: Callable[[str, ArrayLike], NDArray[np.float64]]
     u: dict[str, NDArray[np.float64]]
+    bent_frame: Callable[[str, ArrayLike, ArrayLike], Transforms] | None = None
 
 
 class Planner(Protocol):

@@ -5,6 +5,8 @@ one is planned and started, and then the epoch is solved while the mirrors turn.
 """
 
 import asyncio
+import math
+import re
 from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -22,6 +24,7 @@ from catseye.coordinator.intake import Intake, Solver
 from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.journal.protocol import JournalWriter
 from catseye.coordinator.link.decode import measurement_of, shot_of
+from catseye.coordinator.link.health import RangerHealth
 from catseye.coordinator.link.preparation import Preparation
 from catseye.coordinator.link.ranger import LinkListeners, RangerLink
 from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
@@ -43,9 +46,12 @@ from catseye.ranger.initialisation import commands_of_ranger
 from catseye.ranger.line import Reply, Request
 from catseye.records.night.live import Happening, LivePosture
 from catseye.records.site.folder import SiteFolder
+from catseye.reduction.live.changes import LiveChange
 from catseye.reduction.live.live import EpochAnswer, Live
 
 ALARMS_EVERY = 1.0  # s
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")  # of an actuator, of a person
+MOVE_UNITS = ("m", "mm", "um", "rad", "deg", "arcsec", "counts", "V")
 LINK_STATES: dict[Mode, Wanted] = {"active": "measure", "passive": "listen", "hold": "hold"}
 
 
@@ -113,6 +119,7 @@ class Coordinator:
         self.clock = clock = environment.clock
         self._live, self._planner, self._guard, self._journal = parts.live, parts.planner, parts.guard, parts.journal
         self.listeners: list[Callable[[Entry], None]] = []
+        self.health_listeners: list[Callable[[RangerHealth], None]] = []
         self._event_log = EventLog("coordinator", clock, self.tell)
         self._stations = StationEvents(clock, self.tell)
         self.intake = Intake(
@@ -151,6 +158,8 @@ class Coordinator:
         )
         self.alarms = AlarmBook(clock, lambda: self.condition.now().alarms, EventLog("alarms", clock, self.tell))
         self.planned: Round | None = None  # the round under way
+        self.gives_corrections = True
+        self.at_border: list[Callable[[], None]] = []  # called between two rounds
         self._script = feed if isinstance(feed, MotionScript) else None
         self.feed = self._listening(*feed, environment) if isinstance(feed, tuple) else None
         self.posture: LivePosture | None = None
@@ -176,7 +185,7 @@ class Coordinator:
                 preparation=Preparation.of(commands_of(name), later),
                 guard=self._guard,
                 environment=environment,
-                listeners=LinkListeners(self.tell, self._overheard, self.intake.take),
+                listeners=LinkListeners(self.tell, self._overheard, self.intake.take, self._healthy),
                 wanted=LINK_STATES[self.mode],
                 settings=self.settings.links,
             )
@@ -269,6 +278,8 @@ class Coordinator:
     async def _rounds(self) -> None:
         loop, next_epoch = asyncio.get_running_loop(), 0.0
         while True:
+            for act in self.at_border:
+                act()
             self.intake.flush()  # the planner needs the status of the last shots
             now_ticks = ticks_now(self.clock)
             stopped = self.mode != "active" or self.intake.trouble is not None or not self.host_clock.believed
@@ -320,6 +331,7 @@ class Coordinator:
             },
             place=self._live.place,
             u=self._live.uncertainty(),
+            bent_frame=None if self._live.bending is None else self._live.bent_frame,
         )
 
     async def _solve(self, now_ticks: int) -> None:
@@ -373,6 +385,10 @@ class Coordinator:
         except InputError as problem:
             self._event_log.tell("bad-shot", f"{link.ranger}: {problem}", "warning", about=link.ranger)
 
+    def _healthy(self, health: RangerHealth) -> None:
+        for listener in self.health_listeners:
+            listener(health)
+
     def tell(self, happening: Happening) -> None:
         """Journal and publish an event."""
         self.intake.take(happening)
@@ -390,6 +406,47 @@ class Coordinator:
         for name, link in self.links.items():
             link.wanted = "hold" if name in self.firing.dropped and mode == "active" else LINK_STATES[mode]
         self._event_log.tell("mode", f"mode is {mode}", always=True, mode=mode)
+
+    def set_reference(self) -> None:
+        """Make the last epoch the zero of poses and corrections; journalled, and replayed at its place.
+
+        Raises InputError: no epoch yet, or the journal fails.
+        """
+        if self.answer is None:
+            raise InputError("no epoch was solved yet (expected one, whose pose becomes the zero)")
+        if self.intake.trouble is not None:
+            raise InputError(f"a reference cannot be journalled: {self.intake.trouble}")
+        self.intake.change(ticks_now(self.clock), LiveChange(reference=True))
+        self._event_log.tell("reference", "the last epoch becomes the zero of poses and corrections", always=True)
+
+    def record_move(self, actuator: str, value: str, unit: str, by: str, *, reference: int) -> None:
+        """Journal a move of another actuator of the telescope.
+
+        reference   number of the reference epoch then, 0 for none
+
+        Raises InputError: not a name, a number and a unit.
+        """
+        wrong = next((word for word in (actuator, by) if not NAME.fullmatch(word)), None)
+        if wrong is not None:
+            raise InputError(f"{wrong[:20]!a} is not a name (expected a letter with up to 31 letters, digits, _ and -)")
+        if unit not in MOVE_UNITS:
+            raise InputError(f"unit {unit[:20]!a} (expected one of {' '.join(MOVE_UNITS)})")
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            raise InputError(f"value {value[:20]!a} is not a number")
+        self._event_log.tell(
+            "actuator-moved",
+            f"{actuator} was moved to {number:g} {unit}, says {by}",
+            always=True,
+            actuator=actuator,
+            value=value,
+            unit=unit,
+            by=by,
+            reference=str(reference),
+        )
 
     def leased(self, before: str, holder: str) -> None:
         """Log a new holder of the coordinator's lease."""

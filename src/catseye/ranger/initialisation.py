@@ -95,23 +95,6 @@ def cube_numbers(site: SiteFolder) -> dict[str, int]:
     return {REFERENCE: 0, **{name: number for number, name in enumerate(names, start=1)}}
 
 
-def cube_places_mm(site: SiteFolder, ranger: str) -> dict[str, NDArray[np.float64]]:
-    """Positions (3,) mm by name of all targets but ZRG and itself.
-
-    In the ranger's frame, for the site's posture.
-    """
-    at = _in_frame(site, frame_of(site, ranger), places_of(site))
-    return {name: place for name, place in at.items() if name != ranger}
-
-
-def cubes_commands(site: SiteFolder, ranger: str, targets: Iterable[str] | None = None) -> list[Request]:
-    """INI, then COO and KND of the targets but ZRG and itself.
-
-    targets   names; None: all
-    """
-    return SiteCommands(site).of_cubes(ranger, targets)
-
-
 def monument_commands(site: SiteFolder, ranger: str) -> list[Request]:
     """BP and ALPHA, in the ranger's frame."""
     station = local_station(site, ranger)
@@ -165,7 +148,10 @@ class SiteCommands:
         }
 
     def of_cubes(self, ranger: str, targets: Iterable[str] | None = None) -> list[Request]:
-        """Commands as `cubes_commands` gives them."""
+        """INI, then COO and KND of the targets but ZRG and itself.
+
+        targets   names; None: all
+        """
         at, numbers = self._cubes(frame_of(self._site, ranger)), self._numbers
         certified = {b.target: b.certified_distance_mm for b in self._site.benchmarks if b.ranger == ranger}
         commands = [_command("INI", len(numbers) - 1)]

@@ -8,9 +8,7 @@ rpm at 2000 counts a turn, which runs at 599.4 rpm. With the exact sample time, 
 import operator
 from dataclasses import dataclass
 
-from catseye.constants import TWO_PI
 from catseye.errors import ValidityError
-from catseye.geometry.mirror.encoder import COUNTS_PER_TURN
 from catseye.geometry.mirror.slew import Pace
 from catseye.records.site.mirror import MirrorGeometry
 
@@ -97,52 +95,6 @@ def checked_rates(command: str, velocity: int, acceleration: int) -> None:
         )
 
 
-def sample_time(clock_hz: float = CLOCK_HZ) -> float:
-    """Time between two samples of the chip, s.
-
-    clock_hz   clock, above 0 to 8 MHz
-
-    Raises ValidityError: the chip has no such clock. Source: [TEXAS13], table 1.
-
-    >>> f"{sample_time() * 1e6:.2f} us"
-    '341.33 us'
-    """
-    if not 0.0 < clock_hz <= 8e6:
-        raise ValidityError(f"clock {clock_hz:g} Hz is outside 0 to 8e6 Hz, where [TEXAS13] holds")
-    return CLOCKS_PER_SAMPLE / clock_hz
-
-
-def counts_from_turns(turns: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
-    """Counts (or counts/s, counts/s^2) of turns (or turns/s, turns/s^2).
-
-    turns             of the encoder's axis
-    counts_per_turn   four times the encoder's lines
-
-    >>> counts_from_turns(600 / 60, 2000)
-    20000.0
-    """
-    return float(turns) * counts_per_turn
-
-
-def counts_from_radians(angle: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
-    """Counts (or counts/s, counts/s^2) of an angle of the encoder's axis (or its rates).
-
-    angle             rad (or rad/s, rad/s^2)
-    counts_per_turn   four times the encoder's lines
-    """
-    return float(angle) / TWO_PI * counts_per_turn
-
-
-def turns_from_counts(counts: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
-    """Turns (or turns/s, turns/s^2) of counts: the inverse of `counts_from_turns`."""
-    return float(counts) / counts_per_turn
-
-
-def radians_from_counts(counts: float, counts_per_turn: float = COUNTS_PER_TURN) -> float:
-    """Angle of the encoder's axis, rad, of counts (or their rates): the inverse of `counts_from_radians`."""
-    return float(counts) / counts_per_turn * TWO_PI
-
-
 def velocity_integer(counts_per_second: float, sample: float = SAMPLE_TIME) -> int:
     """Integer of ABV for a speed.
 
@@ -151,7 +103,7 @@ def velocity_integer(counts_per_second: float, sample: float = SAMPLE_TIME) -> i
 
     Raises ValidityError: below zero, too small to move, too large. Source: [TEXAS13], page 11, whose example this is.
 
-    >>> velocity_integer(counts_from_turns(600 / 60, 2000), 341e-6), velocity_integer(counts_from_turns(10, 2000))
+    >>> velocity_integer(10 * 2000, 341e-6), velocity_integer(10 * 2000)
     (446956, 447392)
     """
     return _integer("ABV", counts_per_second * sample * FRACTION, f"{counts_per_second:g} counts/s")
@@ -165,7 +117,7 @@ def acceleration_integer(counts_per_second2: float, sample: float = SAMPLE_TIME)
 
     Raises ValidityError: below zero, too small to move, too large. Source: [TEXAS13], page 11, whose example this is.
 
-    >>> acceleration_integer(counts_from_turns(1, 2000), 341e-6)
+    >>> acceleration_integer(2000, 341e-6)
     15
     """
     return _integer("ABA", counts_per_second2 * sample**2 * FRACTION, f"{counts_per_second2:g} counts/s^2")
@@ -209,20 +161,6 @@ def pace_of(mirror: MirrorGeometry, sample: float = SAMPLE_TIME) -> Pace:
         (velocity_counts(mirror.abv_0 or 0, sample), velocity_counts(mirror.abv_1 or 0, sample)),
         (acceleration_counts(mirror.aba_0 or 0, sample), acceleration_counts(mirror.aba_1 or 0, sample)),
     )
-
-
-def derivative_interval(setting: int, sample: float = SAMPLE_TIME) -> float:
-    """Interval of the derivative term, s, for a setting of FSI.
-
-    setting   0 to 255: an interval of setting + 1 samples
-    sample    time between samples, s
-
-    Raises ValidityError: no such setting. Source: [TEXAS13], table 5.
-
-    >>> f"{derivative_interval(3, sample_time(8e6)) * 1e6:.0f} us"
-    '1024 us'
-    """
-    return (checked("FSI", setting) + 1) * sample
 
 
 def _integer(command: str, exact: float, request: str) -> int:

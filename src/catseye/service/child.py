@@ -6,10 +6,13 @@ does not outlive it.
 
 import asyncio
 import os
+import shutil
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext, suppress
+from pathlib import Path
 
 from catseye.errors import InputError
 from catseye.interruption import undo_on_interruption
@@ -134,6 +137,7 @@ class LiveChild:
                 with suppress(ProcessLookupError):
                     process.kill()
                 await process.wait()
+                _remove_temporary(process.pid)
         await asyncio.gather(*self._readers, return_exceptions=True)
         if process.stdin is not None:
             process.stdin.close()
@@ -143,6 +147,7 @@ class LiveChild:
         if self._process is not None and self._process.returncode is None:
             with suppress(OSError):
                 os.kill(self._process.pid, signal.SIGKILL)
+            _remove_temporary(self._process.pid)
 
     async def _read(self, stream: asyncio.StreamReader | None, handle: LineHandler) -> None:
         while stream is not None and (line := await stream.readline()):
@@ -156,3 +161,9 @@ class LiveChild:
     def _warn(self, line: str) -> None:
         self._last_warning = line
         self._warned(line)
+
+
+def _remove_temporary(pid: int) -> None:
+    """Remove the temporary folders, `catseye-PID-…`, of a child that was killed before it could."""
+    for folder in Path(tempfile.gettempdir()).glob(f"catseye-{pid}-*"):
+        shutil.rmtree(folder, ignore_errors=True)

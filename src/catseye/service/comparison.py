@@ -9,14 +9,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.aliases import Array
 from catseye.constants import MILLIMETRE
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.estimation.shapes.motions import motions
+from catseye.geometry.frames.frame import Transforms
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.site.bodies import bodies_of, tracked_names
-from catseye.reduction.site.motion import GROUND, frames_of, ground_from
+from catseye.reduction.site.motion import GROUND, bent_ground_from, frames_of
+from catseye.reduction.structure.site_bending import bending_of
 from catseye.simulator.twin.beam import TracedDish
 from catseye.simulator.twin.site import Twin
 
@@ -69,6 +72,7 @@ class TwinComparison:
     def __init__(self, site: SiteFolder, twin: Twin, *, reference_after: int):
         self._site, self._twin, self._reference_after = site, twin, reference_after
         self._frames, self._bodies = frames_of(site), bodies_of(site, frames_of(site))
+        self._bending = bending_of(site)
         self._lasting = frozenset(tracked_names(site))
         self._dish = TracedDish.of(site.site.paraboloid)
         self._middles: dict[int, float] = {}  # s since the twin's start, by number
@@ -128,13 +132,22 @@ class TwinComparison:
         posture = self._twin.posture(times)
         body_places = places.mean(axis=0)
         ground_places = body_places.copy()
-        for frame in sorted({self._frames[n] for n in names} - {GROUND}):
-            members = [k for k, n in enumerate(names) if self._frames[n] == frame]
-            back = ground_from(self._site, frame, posture.azimuth, posture.elevation).inverse()
+        moving = {n: self._body(n) for n in names if self._frames[n] != GROUND}
+        for body in sorted({*moving.values()}):
+            members = [k for k, n in enumerate(names) if moving.get(n) == body]
+            frame = self._frames[names[members[0]]]
+            back = self._ground_from(frame, body, posture.azimuth, posture.elevation).inverse()
             means = np.stack([back.points(places[:, k]) for k in members], axis=1).mean(axis=0)
-            at_epoch = ground_from(self._site, frame, answer["azimuth"], answer["elevation"]).single
+            at_epoch = self._ground_from(frame, body, answer["azimuth"], answer["elevation"]).single
             body_places[members], ground_places[members] = means, at_epoch.points(means)
         return body_places, ground_places
+
+    def _body(self, name: str) -> str:
+        """Name shared by points that move as one."""
+        return self._frames[name] if self._bending is None else self._bending.body(name)
+
+    def _ground_from(self, frame: str, body: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
+        return bent_ground_from(self._site, frame, body, azimuth, elevation, self._bending)
 
     def _offsets(self, answer: Mapping[str, Any], body_places: Mapping[str, Array]) -> tuple[Array, Array, Array]:
         """Beam offset since the reference epoch: estimate, u, truth."""

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from catseye.coordinator.clients.server import ZiyServer
+from catseye.coordinator.control.bindings import SiteControl
 from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.feed import MotionScript
 from catseye.coordinator.guard.guard import SafetyGuard
@@ -42,6 +43,7 @@ from catseye.records.site.keep_out import KeepOut
 from catseye.records.site.solids import Solids
 from catseye.records.site.validity import expired, expired_of_site
 from catseye.reduction.live.live import Live, LiveSettings
+from catseye.service.archive.samplers import SamplerArchive
 from catseye.service.settings import settings_object
 from catseye.service.solver import SolverProcess
 
@@ -70,6 +72,8 @@ class Orders:
     key            of the site, required at its own port and sent to those of rangers and feed; None for none
     tls            files of TLS for addresses beyond this machine
     keep_out, interlocks, solids   files; None: only the Sun is avoided, nothing obstructs
+    archive_samplers   directory for FITS files of all samplers; None for none
+    archive_every_s    s, of a file
     """
 
     mode: Mode = "active"
@@ -87,6 +91,8 @@ class Orders:
     keep_out: Path | None = None
     interlocks: Path | None = None
     solids: Path | None = None
+    archive_samplers: Path | None = None
+    archive_every_s: float = 60.0
 
 
 @dataclass(frozen=True)
@@ -209,7 +215,9 @@ class LiveCoordinator:
             self.ziy.firing.dropped.add(name)
             self.ziy.links[name].wanted = "hold"
         door = Door(key=orders.key, tls=orders.tls)
-        self.server = ZiyServer(self.ziy, orders.host, orders.port, network=network, door=door)
+        self.control = SiteControl(self.ziy, planner=self.planner, guard=self.guard, live=self.live)
+        self.server = ZiyServer(self.ziy, orders.host, orders.port, network=network, door=door, control=self.control)
+        self.archive = self._archivist(clock)
 
     def _opened(
         self, clock: Clock, seed: int | None, virtual: bool, tell: JournalTell
@@ -231,6 +239,21 @@ class LiveCoordinator:
         )
         self._run = journal.run
         return WaitingJournal(journal) if virtual else journal
+
+    def _archivist(self, clock: Clock) -> SamplerArchive | None:
+        """Archive of the samplers, if one is asked for."""
+        if self.orders.archive_samplers is None:
+            return None
+        log = EventLog("archive", self.ziy.clock, self.ziy.tell)
+        archive = SamplerArchive(
+            self.orders.archive_samplers,
+            every=self.orders.archive_every_s,
+            clock=clock,
+            site=self.site.site.campaign.name,
+            report=lambda trouble: log.standing("archive-away", trouble, "alarm", over="samplers are archived again"),
+        )
+        self.server.board.samplers.listeners.append(archive.add)
+        return archive
 
     async def _start_solver(self, solver: SolverProcess) -> None:
         """Start the solver before the first epoch, after the rangers' initialisation.
@@ -295,13 +318,15 @@ class LiveCoordinator:
         Raises InputError if its own port is not available.
         """
         before, loading = sys.getswitchinterval(), None
-        watching = None
+        watching = archiving = None
         keep_heap_small()
         sys.setswitchinterval(SWITCH)
         try:
             await self.server.start()
             started()
             self._tell_expired()
+            if self.archive is not None:
+                archiving = asyncio.ensure_future(self.archive.run())
             if isinstance(self._journal, Journal):
                 watching = asyncio.ensure_future(self._watch_disk(self._journal))
             if self._solver is not None:  # beside the loop, while the mirrors go to their first targets
@@ -323,6 +348,13 @@ class LiveCoordinator:
             gc.unfreeze()
             sys.setswitchinterval(before)
             await self.server.stop()
+            if self.archive is not None:
+                if archiving is not None:
+                    archiving.cancel()
+                    await asyncio.gather(archiving, return_exceptions=True)
+                await asyncio.to_thread(self.archive.finish)
+                if self.archive.trouble is not None:
+                    self._tell("archive", self.archive.trouble, "alarm")
             if self._journal is not None:
                 with suppress(InputError):  # unwritten entries have been reported
                     await asyncio.to_thread(self._journal.close)

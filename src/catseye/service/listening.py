@@ -67,17 +67,6 @@ def start_line_of(line: str) -> StartLine:
         raise InputError(f"the twin printed {line[:80]!a} (expected its addresses)") from problem
 
 
-def listening_of(line: str) -> Listening:
-    """Addresses in a line of a child that serves.
-
-    Raises InputError for any other line.
-    """
-    at = start_line_of(line).at
-    if at is None:
-        raise InputError(f"the twin printed {line[:80]!a} (expected its addresses)")
-    return at
-
-
 def _listening(stored: Mapping[str, Any]) -> Listening:
     rangers = {str(name): (str(host), int(a), int(b)) for name, (host, a, b) in stored["rangers"].items()}
     feed = None if stored["feed"] is None else (str(stored["feed"][0]), int(stored["feed"][1]))

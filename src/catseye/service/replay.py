@@ -162,7 +162,7 @@ class ReplayOutcome:
         parts = [f"{self.unasked} shots whose answer was not stored"] * bool(self.unasked)
         if self.unstored:
             parts.append(f"what the journal's version did not store ({', '.join(sorted(self.unstored))})")
-        return (*parts, "commands, happenings and documents, which the reduction does not use")
+        return (*parts, "commands, happenings and all other documents, which the reduction does not use")
 
 
 def versions_here() -> dict[str, str]:

@@ -21,7 +21,6 @@ from catseye.memory import give_back, keep_heap_small
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.live.live import EpochJob
 
-PROGRAM = (sys.executable, "-P", "-c", "from catseye.service.solver import serve; serve()")
 NICE = 5
 LENGTH = 8  # bytes before each message
 
@@ -52,7 +51,7 @@ class SolverProcess:
             if self._process is not None or self._ended:
                 return
             self._process = subprocess.Popen(
-                PROGRAM, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+                _program(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
             )  # its own session: Ctrl-C is for this process, which then stops the child
             with suppress(OSError):  # the first request will notice that it died
                 _send(self._process.stdin, dumped(self._site, None))
@@ -155,6 +154,11 @@ def serve() -> None:
             give_back()
     except (EOFError, OSError):
         return
+
+
+def _program() -> tuple[str, ...]:
+    """Command line of the solver's process, by the name of its function."""
+    return sys.executable, "-P", "-c", f"from {__name__} import {serve.__name__}; {serve.__name__}()"
 
 
 def _send(pipe: Any, message: bytes) -> None:

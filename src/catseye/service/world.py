@@ -28,6 +28,7 @@ class TwinWords:
     motion       of the telescope, as typed
     conditions   name of the weather: night, windy-day, dewy-night
     faults       as typed: KIND WHOM [START [END [SIZE]]]
+    structure    file of the structural model that bends the site's telescope; "": the site's own, if any
 
     Raises InputError: an unknown motion, weather or fault.
     """
@@ -38,6 +39,7 @@ class TwinWords:
     motion: str = MOTION
     conditions: str = "night"
     faults: tuple[str, ...] = ()
+    structure: str = ""
 
     def __post_init__(self) -> None:
         AxisMotion.parse(self.motion)
@@ -85,6 +87,7 @@ class TwinWords:
         """The same as options of `catseye zy`."""
         words = [f"--seed={self.seed}", f"--start={self.start_mjd!r}", f"--clock-offset-s={self.offset!r}"]
         words += [f"--motion={self.motion}", f"--conditions={self.conditions}"]
+        words += [f"--structure={self.structure}"] if self.structure else []
         return ["--twin", *words, *(f"--fault={fault}" for fault in self.faults)]
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from catseye.coordinator.clients.board import HELP
-from catseye.coordinator.clients.samplers import COLUMNS, RING_LENGTH, Samplers
 from catseye.coordinator.clients.server import KINDS, MOST_CLIENTS, MOST_UNSENT, ZiyServer
 from catseye.coordinator.journal.entries import AnsweredShot, EpochSolution
 from catseye.coordinator.parts import ticks_now
+from catseye.coordinator.samplers.rings import COLUMNS, RING_LENGTH, Samplers
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
 from catseye.ranger.door import Door
@@ -199,6 +199,70 @@ def test_parameters_are_checked_then_prepared_then_started():
             assert (await client.ask("SET", "mode", "active")).ok
             assert (await client.ask("START")).ok is False  # changed since it was prepared
             assert site.ziy.firing.dropped == {"ZY102"}
+
+    run(story)
+
+
+def test_reference_and_moves_are_journalled():
+    async def story():
+        async with Served() as site:
+            heard = []
+            anna, ben = await site.client(heard=heard.append), await site.client()
+            assert (await anna.ask("LEASE", "anna")).ok
+            assert (await ben.ask("REFERENCE", "NOW")).text.startswith("REFERENCE needs the lease")
+            early = await anna.ask("REFERENCE", "NOW")
+            assert (early.ok, early.text[:26]) == (False, "no epoch was solved yet (e")
+            await until(lambda: site.ziy.answer is not None)
+            assert (await ben.ask("REFERENCE")).values[:5] == ("none", "none", "none", "none", "0")
+            assert (await anna.ask("REFERENCE", "NOW")).ok
+            assert [change.reference for change in site.live.changes] == [True]
+            await until(lambda: "reference" in site.kinds())
+            documents = [row for row in site.journal.rows if getattr(row, "name", "") == "live-changed"]
+            assert [row.text for row in documents] == ['{"reference": true}']
+            assert (await ben.ask("MOVED", "subreflector_y", "2.5", "mm", "ben")).ok  # no beam: no lease
+            for words in (
+                ("x", "nan", "mm", "b"),
+                ("x", "1", "furlong", "b"),
+                ("1x", "1", "mm", "b"),
+                ("x", "1", "mm"),
+            ):
+                assert (await ben.ask("MOVED", *words)).ok is False
+            await until(lambda: "actuator-moved" in site.kinds())
+            row = next(row for row in site.journal.rows if getattr(row, "kind", "") == "actuator-moved")
+            assert (row.text, row.details["value"]) == ("subreflector_y was moved to 2.5 mm, says ben", "2.5")
+            moves = await ben.ask("SAMPLER", "MOVES")
+            assert moves.values[2:] == ("subreflector_y", "2.5", "mm", "ben", "0")
+
+    run(story)
+
+
+def test_journal_that_fails_takes_no_reference():
+    async def story():
+        async with Served() as site:
+            anna = await site.client()
+            await anna.ask("LEASE", "anna")
+            await until(lambda: site.ziy.answer is not None)
+            site.journal.broken = "disk full"
+            refused = await anna.ask("REFERENCE", "NOW")
+            assert (refused.ok, refused.text) == (False, "a reference cannot be journalled: disk full")
+            assert site.live.changes == []
+
+    run(story)
+
+
+def test_corrections_are_pushed_and_started_off():
+    async def story():
+        async with Served() as site:
+            heard = []
+            client = await site.client(heard=heard.append)
+            assert (await client.ask("SUBSCRIBE", "CORRECTION")).ok
+            await until(lambda: [r for r in heard if r.command == "CORRECTION"])
+            pushed = next(r for r in heard if r.command == "CORRECTION")
+            assert pushed.values[:5] == ("1", "unknown", "none", "none", "none")  # the scene's answers have no pose
+            site.ziy.gives_corrections = False
+            heard.clear()
+            await until(lambda: [r for r in heard if r.command == "CORRECTION"])
+            assert heard[-1].values[1] == "off"
 
     run(story)
 

@@ -306,3 +306,40 @@ def test_polynomial_of_five_nodes_follows_a_slewing_telescope():
     wanted = 100.0 * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     nodes = 100.0 * np.stack([np.cos(0.0103 * t), np.sin(0.0103 * t)], axis=-1)
     assert np.abs(lagrange(t, at) @ nodes - wanted).max() < 1e-6
+
+
+# Parameters that a client sets ---------------------------------------------------------------------------------------
+
+
+def test_scan_list_leaves_the_reference_and_benchmarks(first):
+    planner = RoundPlanner(few_prisms())
+    listed = frozenset(sorted(n for n in shooters(first) if n.startswith("TR"))[:4])
+    planner.scan_list = listed
+    found = set(shooters(planner.round(state(NIGHT))))
+    benches = {b.target for b in few_prisms().benchmarks}
+    assert listed <= found <= listed | benches | {"ZRG"}
+
+
+def earliest(planned, target):
+    """Ticks of the first shot on a target from the round's start; the round's length without any."""
+    begins = [shot.begin_ticks for shots in planned.shots.values() for shot in shots if shot.target == target]
+    return min(begins, default=planned.end_ticks) - planned.begin_ticks
+
+
+def test_priority_draws_shots_and_a_low_one_repels_them(first):
+    """Last of all and first of all, by the ball's priority."""
+    balls = sorted(n for n in shooters(first) if n.startswith("TR") and n.endswith("-B"))
+    last, soonest = max(balls, key=lambda n: earliest(first, n)), min(balls, key=lambda n: earliest(first, n))
+    planner = RoundPlanner(few_prisms())
+    planner.priorities = {last: 1000.0, soonest: 0.001}
+    again = planner.round(state(NIGHT))
+    assert earliest(again, last) < earliest(first, last)
+    assert earliest(again, soonest) > earliest(first, soonest)
+
+
+def test_rate_is_not_exceeded():
+    planner = RoundPlanner(few_prisms(), settings=RoundSettings(interval=2.0))
+    for name, shots in planner.round(state(NIGHT)).shots.items():
+        begins = np.array([shot.begin_ticks for shot in shots]) * TICK_SECONDS
+        assert len(begins) >= 3, name
+        assert np.diff(begins).min() >= 2.0 - 2 * TICK_SECONDS, name

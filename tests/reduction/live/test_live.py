@@ -10,8 +10,8 @@ from catseye.records.night.live import TICKS_PER_DAY, LivePosture, LiveShot, Liv
 from catseye.records.site.folder import REFERENCE
 from catseye.reduction.epoch.allowance import Allowance, AllowanceReason
 from catseye.reduction.epoch.epoch import reduce_epoch
+from catseye.reduction.epoch.motion.telescope_motion import TelescopeKnots
 from catseye.reduction.epoch.self_check import LENGTH
-from catseye.reduction.epoch.telescope_motion import TelescopeKnots
 from catseye.reduction.live.live import Live, LiveSettings
 from catseye.simulator.twin.conditions import STILL
 from live_scene import DISH, Feed, Night, begun, deviations, lasting, sights, site, twin

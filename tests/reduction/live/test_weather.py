@@ -162,8 +162,47 @@ def test_humidity_in_fractions_of_one_is_noted_with_both_readings():
         assert watch.add(read("WX1", t, humidity=0.62)) == ""
         assert watch.add(read("WX2", t, humidity=61.0)) == ""
     [note] = watch.notes()
-    assert note.startswith("WX1: a humidity of 0.62 %")
+    assert note.startswith("WX1's hygrometer reads 0.62 %")
     assert "62 %" in note
+
+
+def test_pressure_reduced_to_sea_level_is_noted_where_the_elevation_is_known():
+    watch = StationWatch(("WX1", "WX2"), {"WX1": 804.0, "WX2": 850.0})
+    for t in STEPS:
+        assert watch.add(read("WX1", t, pressure=1020.0)) == ""
+        assert watch.add(read("WX2", t, pressure=925.0)) == ""
+    [note] = watch.notes()
+    assert note.startswith("WX1's barometer reads 1020.0 hPa at 804 m")
+    assert "reduced to sea level" in note
+
+
+def scattered(t):
+    return round(10.0 + 0.05 * float(np.random.default_rng(round(t)).normal()), 2)
+
+
+def test_stuck_sensor_is_rejected_since_it_stopped_until_it_moves_again():
+    """Readings of 0.05 °C of scatter stop at 600 s; half an hour later they come back."""
+    watch = StationWatch(("WX1", "WX2"))
+    times = np.arange(0.0, 4800.0, 10.0)
+    replies = fed(watch, times, WX1=scattered, WX2=lambda t: scattered(t if not 600.0 <= t < 2400.0 else 600.0))
+    assert not any(replies["WX1"])
+    rejected = times[[bool(reply) for reply in replies["WX2"]]]
+    assert 1200.0 <= rejected[0] < 1500.0
+    assert rejected[-1] == 2390.0
+    assert "its sensor is stuck, rejected" in replies["WX2"][200]
+    [stretch] = watch.stretches()
+    assert (stretch.station, stretch.first) == ("WX2", ticks(610.0))
+    assert ticks(2390.0) <= stretch.last < ticks(2400.0)
+    assert not any(
+        ticks(610.0) <= w.ticks < ticks(2400.0) for w in watch.trusted_readings(ticks(4800.0)) if w.station == "WX2"
+    )
+    assert speaking(watch, 4790.0) == {"WX1", "WX2"}
+
+
+def test_calm_air_in_a_coarse_logger_is_not_a_stuck_sensor():
+    watch = StationWatch(("WX1",))
+    replies = fed(watch, np.arange(0.0, 7200.0, 10.0), WX1=lambda t: round(10.0 - t / 36000.0, 1))
+    assert not any(replies["WX1"])
 
 
 def test_later_readings_are_discarded_when_the_clock_is_set_back():

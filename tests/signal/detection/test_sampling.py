@@ -9,13 +9,12 @@ import pytest
 from catseye.constants import SPEED_OF_LIGHT
 from catseye.errors import ValidityError
 from catseye.signal.cycles.whole import unwrapped_length, whole_cycles
-from catseye.signal.detection.frequency_plan import FrequencyPlan, synthetic_half_wavelength, unambiguous_range
+from catseye.signal.detection.frequency_plan import FrequencyPlan
 from catseye.signal.detection.phase import detect
 from catseye.signal.detection.sampling import (
     SamplingPlan,
     aliasing_harmonics,
     buffer_mean,
-    jitter_amplitude_factor,
     jitter_u_phase,
     modulation_response,
     motion_effect,
@@ -104,17 +103,6 @@ def test_beats_follow_light_and_oscillator():
         assert plan.beat_hz(1000.0, received_offset_hz=receding) == pytest.approx(1000 - rate / (2 * np.pi), abs=1e-9)
 
 
-def test_two_modulations_make_a_longer_one():
-    assert synthetic_half_wavelength(1500e6, 1485e6) == pytest.approx(SPEED_OF_LIGHT / 30e6, rel=1e-15)
-    assert synthetic_half_wavelength(1485e6, 1500e6, N_AIR) == pytest.approx(SPEED_OF_LIGHT / 30e6 / N_AIR, rel=1e-15)
-    # 1500, 1485 and 1490 MHz agree again at the divisor of 5 MHz
-    assert unambiguous_range([1_500_000_000, 1_485_000_000, 1_490_000_000]) == pytest.approx(SPEED_OF_LIGHT / 10e6)
-    length = unambiguous_range([1_500_000_000, 1_485_000_000, 1_490_000_000])
-    for f in (1500, 1485, 1490):
-        plan = FrequencyPlan(reference_hz=f * 1e6, multiple=1)
-        assert turned(plan.phase(7.0 + length), plan.phase(7.0)) == pytest.approx(0.0, abs=1e-10)
-
-
 @pytest.mark.parametrize(
     ("make", "text"),
     [
@@ -122,9 +110,6 @@ def test_two_modulations_make_a_longer_one():
         (lambda: FrequencyPlan(reference_hz=float("nan")), "reference frequency nan Hz"),
         (lambda: FrequencyPlan(multiple=1.5), "multiple of the reference 1.5 is not a whole number of at least 1"),
         (lambda: FrequencyPlan(oscillator="beside"), "local oscillator 'beside' is neither 'above' nor 'below'"),
-        (lambda: synthetic_half_wavelength(1e9, 1e9), "two modulations of the same 1000000000.0 Hz have no beat"),
-        (lambda: unambiguous_range([1e9, 1.5]), "modulation 1.5 Hz is not a whole number"),
-        (lambda: unambiguous_range([]), "no modulation given"),
         (lambda: SamplingPlan().with_(cycles=1200), "1200 cycles of 64 samples are 76800, the buffer holds 65536"),
         (
             lambda: SamplingPlan().with_(intermediate_hz=2000.0),
@@ -265,7 +250,7 @@ def test_a_line_in_the_phase_is_averaged_as_predicted():
 
 @pytest.mark.parametrize(("n", "phase"), [(3, 0.4), (4, 0.0), (5, 1.0), (16, 2.0)])
 @pytest.mark.parametrize("radians", [0.02, 0.4])
-def test_jitter_makes_the_loss_and_the_scatter_that_is_claimed(n, phase, radians):
+def test_jitter_makes_the_scatter_that_is_claimed(n, phase, radians):
     sampling = SamplingPlan(n, 120 // n)
     u_trigger = radians / (2 * np.pi * 1000.0)
     rng = np.random.default_rng(n)
@@ -273,10 +258,7 @@ def test_jitter_makes_the_loss_and_the_scatter_that_is_claimed(n, phase, radians
         scale=u_trigger, size=(20_000, sampling.samples)
     )
     phasors = detect(np.cos(2 * np.pi * 1000 * t - phase), n).phasor * np.exp(-1j * phase)
-    # 20 000 buffers give a standard deviation to 0.5 %, here at four sigma; the mean to 4 sigma of its own
-    assert np.mean(phasors.real) == pytest.approx(
-        float(jitter_amplitude_factor(sampling, u_trigger)), abs=3e-3 * radians
-    )
+    # 20 000 buffers give a standard deviation to 0.5 %, here at four sigma
     scatter = np.std(np.angle(phasors))
     # at 0.4 rad the phase is not quite linear in the phasor: 1/mn of its variance
     assert scatter == pytest.approx(float(jitter_u_phase(sampling, u_trigger)), rel=0.02 + 0.02 * radians)

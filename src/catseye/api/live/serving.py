@@ -7,6 +7,7 @@ import asyncio
 import os
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
@@ -14,7 +15,7 @@ from catseye.aliases import Progress
 from catseye.api.journal import mjd_argument
 from catseye.api.live.beside import site_page
 from catseye.api.live.limits import LAST_PORT, one_of, within
-from catseye.api.reading import place_of
+from catseye.api.reading import place_of, with_structure
 from catseye.api.units import In, with_units
 from catseye.errors import ArgumentError, InputError
 from catseye.memory import uncollected
@@ -54,6 +55,8 @@ class OrderOptions(TypedDict, total=False):
     keep_out: Place
     interlocks: Place
     solids: Place
+    archive_samplers: Place
+    archive_every_s: float
 
 
 @with_units
@@ -68,6 +71,7 @@ def zy(
     start_mjd: Annotated[Any, In("mjd", one=True, text=True)] = None,
     conditions: str = "night",
     faults: Sequence[str] = (),
+    structure: Place = None,
     clock_offset_s: Annotated[Any, In("s", one=True)] = None,
     cold: bool = False,
     laser_at_boot: bool = False,
@@ -90,6 +94,7 @@ def zy(
     head             "package.module:factory" of a real head, called with the ranger's name
     seed, motion, conditions, faults   of the twin, as for `simulate`
     start_mjd        UTC at the twin's start, MJD or text; None for the present by its clock
+    structure        structural model that bends the twin's telescope; the site's own structural-model.toml without
     clock_offset_s   s, of the twin's time against this machine's UTC; None: it is `start_mjd` now
     cold             True for rangers just powered on, not ready
     laser_at_boot    True for lasers that shine from power-up on
@@ -113,7 +118,7 @@ def zy(
     _refuse_serving(twin, head, loopback, host, ports, port_base, clock_offset_s)
     world = twin_world(start_mjd, clock_offset_s, twin_options(seed, motion, conditions, faults))
     with uncollected():
-        records = read_site_of(site)
+        records = read_site_of(site, structure)
         names = _named(records, rangers)
         if ports is not None and len(names) != 1:
             raise InputError(f"{len(names)} rangers cannot share two ports (expected one ranger, or a port base)")
@@ -150,6 +155,7 @@ def ziy(
     addresses: Place = None,
     feed: str | None = None,
     motion_script: str | None = None,
+    structure: Place = None,
     clock_offset_s: Annotated[Any, In("s", one=True)] = 0.0,
     log_json: bool = False,
     screen: bool = False,
@@ -164,6 +170,8 @@ def ziy(
     addresses        TOML file with the address of each ranger and of the feed
     feed             HOST:PORT of weather and telescope
     motion_script    file, or "fixed AZ EL", of a motion known beforehand; no feed
+    structure        structural model by which the telescope bends: aims and places are by it, poses beyond it; the
+                     site's own structural-model.toml without
     clock_offset_s   s, of its clock against this machine's
     log_json         True for a log of JSON objects
     screen           True for a screen instead of the log
@@ -181,7 +189,7 @@ def ziy(
         from catseye.service.serving import ServedSite
 
         given = coordinator_orders(**orders)
-        records = read_site_of(site)
+        records = read_site_of(site, structure)
         peers = _peers(records, port_base, loopback, addresses, feed, motion_script)
         return ServedSite(records, given, peers, offset=clock_offset_s, log_options=options)
 
@@ -204,6 +212,7 @@ def serve(
     addresses: Place = None,
     feed: str | None = None,
     motion_script: str | None = None,
+    structure: Place = None,
     page: bool = True,
     page_host: str | None = None,
     page_port: Annotated[Any, In("", whole=True)] = None,
@@ -227,6 +236,7 @@ def serve(
     page_token_file   file of the token of its commands; None for a new token
     page_names     further names that the page is called by
     announce       called once with a line on the page: its link with the token, or that there is none
+    structure      structural model of the telescope, for the coordinator and for the twin
     others as for `ziy`
 
     Raises InputError and ArgumentError as `ziy`.
@@ -240,6 +250,8 @@ def serve(
         names = ("twin", "loopback", "addresses", "feed", "motion_script")
         raise ArgumentError("twin brings its rangers and its feed: no loopback, addresses, feed, motion_script", *names)
     world = twin_world(start_mjd, 0.0 if start_mjd is None else None, twin_options(seed, motion, conditions, faults))
+    if structure is not None:
+        world = replace(world, structure=str(place_of(structure)))
 
     beside = None
     if page:
@@ -258,7 +270,7 @@ def serve(
         from catseye.service.serving import ServedSite
 
         given = coordinator_orders(**orders)
-        records = read_site_of(site)
+        records = read_site_of(site, structure)
         peers = _peers(records, port_base, loopback, addresses, feed, motion_script)
         if twin:
             world.twin(records)  # an impossible twin is refused here
@@ -327,6 +339,8 @@ def coordinator_orders(
     keep_out: Place = None,
     interlocks: Place = None,
     solids: Place = None,
+    archive_samplers: Place = None,
+    archive_every_s: float = 60.0,
 ) -> "Orders":
     """Orders of a coordinator; its key and TLS files are those of the environment.
 
@@ -340,6 +354,8 @@ def coordinator_orders(
     rotate_night   True to rotate at noon UTC, too
     host, port     of its own clients; None for 127.0.0.1 and 5260, port 0 for any free one
     keep_out, interlocks, solids   files; None for none
+    archive_samplers   directory for FITS files of all samplers, written while it runs; None for none
+    archive_every_s    s, of a file, 5 to 3600
     """
     from typing import get_args
 
@@ -353,8 +369,10 @@ def coordinator_orders(
     within("round_s", round_s, 2.0, 600.0, " s")
     within("rotate_gb", rotate_gb, 0.0, 1e6, " GB")
     within("port", port, 0, LAST_PORT)
+    within("archive_every_s", archive_every_s, 5.0, 3600.0, " s")
     files = {"keep_out": keep_out, "interlocks": interlocks, "solids": solids}
     named: dict[str, Any] = {name: None if path is None else place_of(path) for name, path in files.items()}
+    named["archive_samplers"] = None if archive_samplers is None else place_of(archive_samplers)
     named |= {name: value for name, value in (("host", host), ("port", port)) if value is not None}
     return Orders(
         mode=mode,  # type: ignore[arg-type]  # held to be one above
@@ -363,6 +381,7 @@ def coordinator_orders(
         filter=filter_,  # type: ignore[arg-type]
         journal=None if journal is None else str(journal),
         keep_buffers=keep_buffers,
+        archive_every_s=archive_every_s,
         rotate_gb=rotate_gb,
         rotate_night=rotate_night,
         key=key_of(),
@@ -371,11 +390,11 @@ def coordinator_orders(
     )
 
 
-def read_site_of(site: "str | os.PathLike[str]") -> "SiteFolder":
-    """Records of a site, by its folder or its bundled name."""
+def read_site_of(site: "str | os.PathLike[str]", structure: Place = None) -> "SiteFolder":
+    """Records of a site, by its folder or its bundled name; with a structural model in place of its own, if any."""
     from catseye.records.site.folder import read_site
 
-    return read_site(place_of(site))
+    return with_structure(read_site(place_of(site)), structure)
 
 
 def mjd_start(start_mjd: float | str | None, usual: float | None = None, *, offset: float = 0.0) -> float:

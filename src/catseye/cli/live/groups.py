@@ -8,6 +8,8 @@ import typer
 from catseye.cli.live.options import (
     MOTION,
     PORT_BASE,
+    ArchiveDirectory,
+    ArchiveEveryS,
     Conditions,
     Drop,
     Faults,
@@ -101,6 +103,8 @@ class CoordinatorOptions(NamedTuple):
     keep_out: KeepOutFile = None
     interlocks: InterlocksFile = None
     solids: SolidsFile = None
+    archive_samplers: ArchiveDirectory = None
+    archive_every_s: ArchiveEveryS = 60.0
     host: Host = None
     port: Port = None
 

@@ -52,6 +52,14 @@ Faults = Annotated[
         help="Fault of the twin, s since its start; may repeat. catseye help living has the kinds.",
     ),
 ]
+Structure = Annotated[
+    Path | None,
+    typer.Option(
+        "--structure",
+        metavar="MODEL.toml",
+        help="Structural model by which the telescope bends.  [default: the site's own structural-model.toml]",
+    ),
+]
 PortBase = Annotated[
     int,
     typer.Option(
@@ -99,6 +107,14 @@ KeepOutFile = Annotated[
 ]
 InterlocksFile = Annotated[
     Path | None, typer.Option("--interlocks", metavar="FILE.toml", help="Times at which rangers may not emit or move.")
+]
+ArchiveDirectory = Annotated[
+    Path | None,
+    typer.Option("--archive-samplers", metavar="DIR", help="Directory for FITS files of all samplers, while it runs."),
+]
+ArchiveEveryS = Annotated[
+    float,
+    typer.Option("--archive-every-s", callback=within(5, 3600, " s"), help="Span of such a file, s."),
 ]
 SolidsFile = Annotated[Path | None, typer.Option("--solids", metavar="SOLIDS.toml", help="Solids that obstruct beams.")]
 

@@ -6,7 +6,7 @@ import typer
 
 from catseye.cli.commands import Quiet, app
 from catseye.cli.live.groups import CoordinatorOptions, PageOptions, TwinOptions, arguments
-from catseye.cli.live.options import Site, say_now, tell_people
+from catseye.cli.live.options import Site, Structure, say_now, tell_people
 from catseye.cli.live.ziy import LogJson, Screen, finish_site
 from catseye.cli.option_groups import grouped
 
@@ -21,6 +21,7 @@ def serve(  # noqa: PLR0913 - its options are its command line
     ] = False,
     simulated: TwinOptions,
     coordinator: CoordinatorOptions,
+    structure: Structure = None,
     page: Annotated[
         bool, typer.Option("--page/--no-page", help="A page for browsers, in a process that is restarted if it dies.")
     ] = True,
@@ -37,6 +38,7 @@ def serve(  # noqa: PLR0913 - its options are its command line
         twin=twin,
         **arguments(simulated),
         **arguments(coordinator),
+        structure=structure,
         page=page,
         **arguments(browsers),
         log_json=log_json,

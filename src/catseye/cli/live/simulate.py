@@ -10,6 +10,8 @@ from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.live.options import (
     MOTION,
     PORT_BASE,
+    ArchiveDirectory,
+    ArchiveEveryS,
     Conditions,
     Drop,
     Faults,
@@ -23,6 +25,7 @@ from catseye.cli.live.options import (
     Seed,
     Site,
     Start,
+    Structure,
     leave,
     within,
 )
@@ -46,6 +49,7 @@ def simulate(  # noqa: PLR0913 - its options are its command line
     seed: Seed = 1,
     motion: MotionText = MOTION,
     faults: Faults = None,
+    structure: Structure = None,
     start_mjd: Start = None,
     conditions: Conditions = "night",
     cold: Annotated[bool, typer.Option("--cold", help="Start the rangers from power-on: half a minute more.")] = False,
@@ -54,6 +58,8 @@ def simulate(  # noqa: PLR0913 - its options are its command line
     filter_: FilterName = "random_walk",
     journal: JournalPlace = None,
     keep_buffers: KeepBuffers = True,
+    archive_samplers: ArchiveDirectory = None,
+    archive_every_s: ArchiveEveryS = 60.0,
     port_base: PortBase = PORT_BASE,
     port: Port = None,
     fast: Annotated[
@@ -95,16 +101,24 @@ def simulate(  # noqa: PLR0913 - its options are its command line
     if runs > 1:
         if not fast:
             raise typer.BadParameter("more than 1 are simulated in virtual time: add --fast.", param_hint="'--runs'")
+        if archive_samplers is not None:
+            raise typer.BadParameter("is for one run.", param_hint="'--archive-samplers'")
+        if structure is not None:
+            text = "is for one run; several have the site's own structural-model.toml."
+            raise typer.BadParameter(text, param_hint="'--structure'")
         _simulate_runs(site, runs, out, {**options, **several._asdict()}, json=json, quiet=quiet)
         return
     refuse_several(several, "runs")
     if out is not None:
-        raise typer.BadParameter("is for several runs.", param_hint="'--out'")
+        raise typer.BadParameter("is for several runs; one run keeps a --journal.", param_hint="'--out'")
     from catseye.api.living import simulate as simulated
 
     result = simulated(
         site,
         **options,
+        structure=structure,
+        archive_samplers=archive_samplers,
+        archive_every_s=archive_every_s,
         port_base=port_base,
         port=port,
         fast=fast,

@@ -6,7 +6,7 @@ import typer
 
 from catseye.cli.commands import Quiet, app
 from catseye.cli.live.groups import CoordinatorOptions, arguments
-from catseye.cli.live.options import Site, leave, say_now, tell_people, within
+from catseye.cli.live.options import Site, Structure, leave, say_now, tell_people, within
 from catseye.cli.option_groups import grouped
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def ziy(
     *,
     site: Site,
     coordinator: CoordinatorOptions,
+    structure: Structure = None,
     clock_offset_s: Annotated[
         float,
         typer.Option(
@@ -44,6 +45,7 @@ def ziy(
     end = run(
         site,
         **arguments(coordinator),
+        structure=structure,
         clock_offset_s=clock_offset_s,
         log_json=log_json,
         screen=screen and not quiet,

@@ -7,7 +7,7 @@ import typer
 
 from catseye.cli.commands import Json, Quiet, app
 from catseye.cli.live.groups import TwinOptions, arguments
-from catseye.cli.live.options import PORT_BASE, PortBase, Site, leave, say_now, tell_people, within
+from catseye.cli.live.options import PORT_BASE, PortBase, Site, Structure, leave, say_now, tell_people, within
 from catseye.cli.option_groups import grouped
 from catseye.cli.terminal import ProgressLine
 
@@ -44,6 +44,7 @@ def zy(  # noqa: PLR0913 - its options are its command line
         typer.Option("--head", metavar="PACKAGE.MODULE:FACTORY", help="A real head: called with the ranger's name."),
     ] = None,
     simulated: TwinOptions,
+    structure: Structure = None,
     clock_offset_s: Annotated[
         float | None,
         typer.Option(
@@ -89,6 +90,7 @@ def zy(  # noqa: PLR0913 - its options are its command line
             twin=twin,
             head=head,
             **arguments(simulated),
+            structure=structure,
             clock_offset_s=clock_offset_s,
             cold=cold,
             laser_at_boot=laser_at_boot,

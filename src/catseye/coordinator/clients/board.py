@@ -1,13 +1,23 @@
 """Commands of the coordinator's clients: functions that return rows."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import cast
 
-from catseye.coordinator.clients.parameters import ClientParameter, Parameters
-from catseye.coordinator.clients.samplers import COLUMNS, RING_LENGTH, Samplers, plain
+from catseye.coordinator.control.bindings import SiteControl, coordinator_parameters
+from catseye.coordinator.control.parameters import Parameters
+from catseye.coordinator.event_log import EventLog
+from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.modes import mode_of
+from catseye.coordinator.samplers.columns import COLUMNS
+from catseye.coordinator.samplers.corrections import FRAME, NO_ZERO, PIVOT, CorrectionOutput
+from catseye.coordinator.samplers.health import health_row
+from catseye.coordinator.samplers.pose_rows import Row
+from catseye.coordinator.samplers.rings import RING_LENGTH, Samplers, plain
+from catseye.coordinator.samplers.surface import SurfaceWatch
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
 from catseye.ranger.line import Request, stamp_text
+from catseye.records.night.live import Severity
 
 VERSION = "1"
 MOST_PLANNED = 100  # shots of each ranger
@@ -22,10 +32,23 @@ HELP = {
         "RANGERS",
         "a line each: name; state; shots; failures in a row; target streamed; last status; trouble; condition",
     ),
-    "PARAMETERS": ("PARAMETERS", "a line each: name; value; value that waits; legal values"),
+    "PARAMETERS": (
+        "PARAMETERS",
+        "a line each: name; value; value that waits; legal values; unit; what it changes; meaning; its stage",
+    ),
+    "INTERLOCKS": (
+        "INTERLOCKS",
+        "a line each: parameters compared; rule; refusal of what waits, or none",
+    ),
     "SET": ("SET name, value", "check a parameter's value and store it until START"),
-    "PREPARE": ("PREPARE", "check all values that wait"),
-    "START": ("START", "activate the prepared values"),
+    "PREPARE": ("PREPARE", "check all values that wait, together"),
+    "START": ("START", "activate the prepared values, at the next round's begin"),
+    "DISCARD": ("DISCARD", "forget the values that wait and are not started"),
+    "REFERENCE": (
+        "REFERENCE | REFERENCE NOW",
+        "zero of corrections: epoch; MJD; azimuth; elevation; moves since; frame; pivot; NOW: by the last epoch",
+    ),
+    "MOVED": ("MOVED actuator, value, unit, name", "record a move of another actuator, as a person or a program"),
     "SAMPLERS": ("SAMPLERS", "a line each: name; values kept; what a value holds"),
     "SAMPLER": ("SAMPLER name | SAMPLER name, n", "the last n values, a line each, oldest first"),
     "SUBSCRIBE": ("SUBSCRIBE | SUBSCRIBE kind, ...", "push SHOT EPOCH EVENT POSTURE WEATHER; NONE ends it"),
@@ -54,17 +77,37 @@ ALIASES = {"HELP": "HLP"}
 class Board:
     """A coordinator's commands, parameters and samplers."""
 
-    def __init__(self, coordinator: Coordinator, parameters: tuple[ClientParameter, ...] = ()):
+    def __init__(self, coordinator: Coordinator, control: SiteControl | None = None):
         self._ziy = coordinator
         self.samplers = Samplers()
-        self.parameters = Parameters((*_coordinator_parameters(coordinator), *parameters))
+        self.corrections = CorrectionOutput(lambda: coordinator.gives_corrections)
+        self.surface = SurfaceWatch(coordinator.site, lambda row: self.samplers.put("SURFACE", row))
+        coordinator.health_listeners.append(lambda health: self.samplers.put("HEALTH", health_row(health)))
+        self._control = control
+        own = coordinator_parameters(coordinator)
+        log = EventLog("parameters", coordinator.clock, coordinator.tell)
+
+        def tell(text: str, values: Mapping[str, str], active: bool) -> None:
+            kind, severity = ("parameters", "note") if active else ("parameters-refused", "alarm")
+            log.tell(kind, text, cast(Severity, severity), always=True, **values)
+
+        if control is None:
+            self.parameters = Parameters(own, tell=tell)
+        else:
+            everything = (*own, *control.parameters)
+            self.parameters = Parameters(everything, refuse=control.refuse, adopt=control.adopt, tell=tell)
+        coordinator.at_border.append(self.parameters.border)
         self._commands: dict[str, tuple[tuple[int, ...], Callable[[tuple[str, ...]], Rows]]] = {
             "STATUS": ((0,), lambda _: self._status()),
             "RANGERS": ((0,), lambda _: self._rangers()),
             "PARAMETERS": ((0,), lambda _: self._parameters()),
+            "INTERLOCKS": ((0,), lambda _: self._interlocks()),
             "SET": ((2,), lambda words: self._set(*words)),
             "PREPARE": ((0,), lambda _: [(str(self.parameters.prepare()),)]),
             "START": ((0,), lambda _: [(str(self.parameters.start()),)]),
+            "REFERENCE": ((0, 1), lambda words: self._reference(*words)),
+            "MOVED": ((4,), lambda words: self._moved(*words)),
+            "DISCARD": ((0,), lambda _: [(str(self.parameters.discard()),)]),
             "SAMPLERS": ((0,), lambda _: self._samplers()),
             "SAMPLER": ((1, 2), lambda words: self._sampler(*words)),
             "MODE": ((0, 1), lambda words: self._mode(*words)),
@@ -81,6 +124,16 @@ class Board:
             "VER": ((0,), lambda _: [("ZIY", VERSION)]),
             "HLP": ((0, 1), lambda words: self._help(*words)),
         }
+
+    def entry(self, entry: Entry) -> list[tuple[str, Row]]:
+        """Store a durable entry in the samplers; its rows by sampler, without points."""
+        rows = self.samplers.add(entry)
+        row = self.corrections.row(entry)
+        if row is not None:
+            self.samplers.put("CORRECTIONS", row)
+            rows.append(("CORRECTIONS", row))
+        self.surface.entry(entry)
+        return rows
 
     def rows(self, request: Request) -> Rows | None:
         """Rows of the answer to a request; None for an unknown command.
@@ -159,8 +212,28 @@ class Board:
     def _parameters(self) -> Rows:
         return [tuple(plain(word) for word in row) for row in self.parameters.rows()]
 
+    def _interlocks(self) -> Rows:
+        values = self.parameters.expected()
+        for interlock in () if self._control is None else self._control.interlocks():
+            refusal = interlock.refusal(values)
+            yield " ".join(interlock.parameters), plain(interlock.rule), plain(refusal or "none")
+
     def _set(self, name: str, text: str) -> Rows:
         return [(plain(name.lower()), plain(self.parameters.set(name, text)))]
+
+    def _reference(self, word: str = "") -> Rows:
+        if word and word.upper() != "NOW":
+            raise InputError(f"REFERENCE {word[:20]!a} (expected REFERENCE or REFERENCE NOW)")
+        if word:
+            self._ziy.set_reference()
+        zero = self.corrections.zero
+        words = NO_ZERO if zero is None else zero.words
+        return [(*words, str(self.corrections.moves), plain(FRAME), plain(PIVOT))]
+
+    def _moved(self, actuator: str, value: str, unit: str, by: str) -> Rows:
+        zero = self.corrections.zero
+        self._ziy.record_move(actuator, value, unit, by, reference=0 if zero is None else zero.number)
+        return [(actuator, value, unit, by)]
 
     def _samplers(self) -> Rows:
         return [
@@ -203,34 +276,3 @@ class Board:
     def _applied(self, action: Callable[[str], None], ranger: str) -> Rows:
         action(ranger.upper())
         return [(ranger.upper(),)]
-
-
-def _coordinator_parameters(z: Coordinator) -> tuple[ClientParameter, ...]:
-    """Parameters of the coordinator itself."""
-
-    def dropped(text: str) -> str:
-        names = [] if text.lower() == "none" else text.upper().split()
-        strange = [name for name in names if name not in z.links]
-        if strange:
-            raise InputError(f"{strange[0][:20]!a} is not a ranger here (expected names with blanks between, or none)")
-        return " ".join(sorted(set(names))) or "none"
-
-    def drop(text: str) -> None:
-        names = set() if text == "none" else set(text.split())
-        for name in z.links:
-            if (name in z.firing.dropped) != (name in names):
-                (z.drop if name in names else z.take)(name)
-
-    def set_mode(text: str) -> None:
-        z.set_mode(mode_of(text))
-
-    return (
-        ClientParameter("mode", "active passive hold", lambda: z.mode, lambda text: mode_of(text), set_mode),
-        ClientParameter(
-            "dropped",
-            "rangers with blanks between, or none",
-            lambda: " ".join(sorted(z.firing.dropped)) or "none",
-            dropped,
-            drop,
-        ),
-    )

@@ -16,9 +16,10 @@ from functools import partial
 from itertools import islice
 
 from catseye.coordinator.clients.board import ALIASES, HELP, VERSION, Board
-from catseye.coordinator.clients.samplers import plain
+from catseye.coordinator.control.bindings import SiteControl
 from catseye.coordinator.journal.entries import Entry
 from catseye.coordinator.parts import ticks_now
+from catseye.coordinator.samplers.rings import plain
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import CatseyeError, InputError
 from catseye.ranger.door import DEFAULT_ACCESS, Door, enable_keep_alive_probes, refuse_exposed_port
@@ -40,16 +41,24 @@ LINES_A_SLICE, SLICE_PERIOD = 32, 0.005  # lines of a part of a long answer; s b
 LOOK = 0.5  # s between two checks for silent clients
 TOKEN_BYTES = 16
 WORDS = frozenset([*HELP, *ALIASES, "KEY"])  # allowed first words
-KINDS = {"SHOT": "RANGES", "EPOCH": "EPOCHS", "EVENT": "EVENTS", "POSTURE": "POSTURE", "WEATHER": "WEATHER"}
+KINDS = {
+    "SHOT": "RANGES",
+    "EPOCH": "EPOCHS",
+    "EVENT": "EVENTS",
+    "POSTURE": "POSTURE",
+    "WEATHER": "WEATHER",
+    "CORRECTION": "CORRECTIONS",
+}
 PUSHED = {sampler: kind for kind, sampler in KINDS.items()}
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,15}")
-SETTING = ("SET", "PREPARE", "START", "DROP", "TAKE", "STREAM")
+ASKING = ("MODE", "CLOCK", "REFERENCE")  # without parameters
+SETTING = ("SET", "PREPARE", "START", "DISCARD", "DROP", "TAKE", "STREAM")
 LOG = logging.getLogger(__name__)
 
 
 def commands(request: Request) -> bool:
     """True if a request changes something: those need the lease."""
-    return request.command in SETTING or (request.command in ("MODE", "CLOCK") and bool(request.parameters))
+    return request.command in SETTING or (request.command in ASKING and bool(request.parameters))
 
 
 class Client(asyncio.Protocol):
@@ -199,6 +208,7 @@ class ZiyServer:
 
     host    address to listen at; by default only this machine
     port    0 takes any free one; `port` is the actual one after `start`
+    control parameters besides the coordinator's own two
     """
 
     def __init__(
@@ -209,10 +219,11 @@ class ZiyServer:
         *,
         network: ConnectionMaker | None = None,
         door: Door = DEFAULT_ACCESS,
+        control: SiteControl | None = None,
     ):
         self.coordinator, self.host, self.port, self.door = coordinator, host, port, door
         self.holder: Client | None = None  # holder of the lease
-        self.board = Board(coordinator)
+        self.board = Board(coordinator, control)
         self.clients: set[Client] = set()
         self.gate = Doorway(lambda: f"ZIY: port {self.port}", door, WORDS, _loop_time)
         self._network: ConnectionMaker = network or Sockets(door.tls)
@@ -247,6 +258,7 @@ class ZiyServer:
                 client.transport.close()
         if self._listener is not None:
             await self._listener.close()
+        await self.board.surface.stop()
 
     def now_ticks(self) -> int:
         """Present time of the clock in ticks."""
@@ -288,7 +300,7 @@ class ZiyServer:
 
     def publish(self, entry: Entry) -> None:
         """Store a durable entry in the samplers, push it to subscribers."""
-        for sampler, (stamp, *values) in self.board.samplers.add(entry):
+        for sampler, (stamp, *values) in self.board.entry(entry):
             kind = PUSHED.get(sampler)
             wanting = [] if kind is None else [client for client in self.clients if kind in client.wants]
             if wanting:

@@ -30,6 +30,7 @@ from catseye.ranger.values import Value
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import SiteFolder
 from catseye.records.site.interlock import Act, Interlock, Interlocks
+from catseye.records.site.keep_out import KeepOut
 from catseye.reduction.steering.tracking import AZIMUTH_SLEW, ELEVATION_SLEW, SLEW_ACCELERATION
 
 MOVES = frozenset(["STT", "CIL", "CMEAS", "TRK", "SCN", "FHM"])  # CMEAS 1 only
@@ -93,6 +94,11 @@ class SafetyGuard:
         """
         if ranger in self._memory:
             self._memory[ranger].hear(reply.command, reply.ok, reply.values)
+
+    def adopt(self, keep_out: KeepOut) -> None:
+        """Check against other boxes and another cone from now on, and so does who shares them."""
+        self.keep_clear.adopt(keep_out)
+        self._surroundings.clear()
 
     def stands(self, ranger: str, counts: tuple[float, float]) -> None:
         """Set the position of a parked mirror, counts."""

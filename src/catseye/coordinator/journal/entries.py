@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 NAN = float("nan")
 EPOCH_START = "epoch-begun"  # name of the document that marks when an epoch's shots were taken out
 EPOCH_RANGES = "epoch-ranges"  # of the one behind a solution: its ranges with residuals and corrections
+LIVE_CHANGED = "live-changed"  # of the one that marks a change of the reduction: parameters, reference epoch
 CLOCK_CORRECTED = "clock-corrected"  # of the one that marks a correction of the count of UTC, and its size
 
 
@@ -100,6 +101,7 @@ class StoredAnswer(TypedDict, total=False):
     doubts: list[str]
     biases: dict[str, dict[str, Json]]
     returned: list[dict[str, Json]]
+    reference: int
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,14 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from catseye.coordinator.journal.entries import CLOCK_CORRECTED, EPOCH_START, AnsweredShot, Document, EpochSolution
+from catseye.coordinator.journal.entries import (
+    CLOCK_CORRECTED,
+    EPOCH_START,
+    LIVE_CHANGED,
+    AnsweredShot,
+    Document,
+    EpochSolution,
+)
 from catseye.coordinator.journal.reader import JournalReader, Kind, StoredRun
 from catseye.coordinator.journal.sameness import (
     Sameness,
@@ -16,6 +23,7 @@ from catseye.coordinator.journal.sameness import (
 from catseye.errors import CatseyeError
 from catseye.records.night.live import LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import SiteFolder
+from catseye.reduction.live.changes import LiveChange
 from catseye.reduction.live.live import EpochJob, Live
 
 NOTHING_TO_COMPARE = SolutionComparison(Sameness.IDENTICAL)
@@ -126,6 +134,8 @@ def replay(
             live.posture(entry)
         elif isinstance(entry, Document) and entry.name == EPOCH_START:
             job = live.begin(entry.ticks)
+        elif isinstance(entry, Document) and entry.name == LIVE_CHANGED:
+            live.change(LiveChange.of(entry.text))
         elif isinstance(entry, Document) and entry.name == CLOCK_CORRECTED:
             live.clock_corrected(entry.ticks)
             job = None  # the solution under way was discarded

@@ -9,9 +9,10 @@ import asyncio
 import hashlib
 from collections.abc import Awaitable, Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 from catseye.coordinator.link.decode import reals_of
-from catseye.errors import InputError
+from catseye.errors import InputError, ValidityError
 from catseye.ranger.commands import MOST_CUBES
 from catseye.ranger.head import SamplingSettings
 from catseye.ranger.line import Reply, Request
@@ -147,6 +148,27 @@ async def sampling_of(ask: Ask) -> SamplingSettings:
         int(reals_of(await ask(Request(name), PATIENCE), 1)[0]) for name in ("CYC", "SFQ", "IFF")
     ]
     return SamplingSettings(samples, cycles, frequency)
+
+
+def sampling_requests(before: SamplingSettings, after: SamplingSettings) -> tuple[Request, ...]:
+    """CYC, SFQ and IFF from one sampling to another, in an order in which a ranger refuses none.
+
+    >>> [r.command for r in sampling_requests(SamplingSettings(), SamplingSettings(16, 1200, 2000))]
+    ['SFQ', 'CYC', 'IFF']
+    """
+    old, new = ((("CYC", s.cycles), ("SFQ", s.samples), ("IFF", s.frequency_hz)) for s in (before, after))
+    changed = [pair for pair in new if pair not in old]
+    for order in permutations(changed):
+        values = dict(old)
+        try:
+            for name, value in order:
+                values[name] = value
+                SamplingSettings(values["SFQ"], values["CYC"], values["IFF"])
+        except ValidityError:
+            continue
+        return tuple(Request(name, (str(value),)) for name, value in order)
+    shortest = (("CYC", 1), ("IFF", 1), ("SFQ", after.samples), ("IFF", after.frequency_hz), ("CYC", after.cycles))
+    return tuple(Request(name, (str(value),)) for name, value in shortest)
 
 
 async def counts_of(ask: Ask) -> tuple[float, float]:

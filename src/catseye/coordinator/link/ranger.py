@@ -16,7 +16,16 @@ from catseye.coordinator.event_log import EventLog
 from catseye.coordinator.journal.entries import SentCommand
 from catseye.coordinator.link.clock_watch import ClockWatch
 from catseye.coordinator.link.handshake import Handshake, first_of
-from catseye.coordinator.link.preparation import PATIENCE, Preparation, Refused, counts_of, prepare, sampling_of
+from catseye.coordinator.link.health import RangerHealth, asked_health
+from catseye.coordinator.link.preparation import (
+    PATIENCE,
+    Preparation,
+    Refused,
+    counts_of,
+    prepare,
+    sampling_of,
+    sampling_requests,
+)
 from catseye.coordinator.link.settings import Address, LinkSettings, Wanted
 from catseye.coordinator.link.shooting import Shooter
 from catseye.coordinator.link.status_watch import StatusWatch
@@ -32,6 +41,7 @@ from catseye.records.night.live import LiveShot
 
 State = Literal["down", "connected", "preparing", "ready"]
 LONGEST_REPLY_TEXT = 200  # characters of a reply, in the journal
+HEALTH_EVERY = 10.0  # s
 LONGEST_PATIENCE = 60.0  # s between two attempts to make a ranger ready
 HOLDER = f"ziy-{os.getpid() % 10**8}"  # name of this coordinator's lease; each coordinator has its own
 LEASE_WITH_NUMBER, LEASE_WITH_TOKEN = 2, 4  # values: name, number of the connection, address, token
@@ -45,11 +55,13 @@ class LinkListeners:
     tell         with events
     heard        with replies to another client (CMEAS ...)
     commanded    with each request sent that changes something, and its result
+    health       with its health, every `HEALTH_EVERY` s
     """
 
     tell: Tell
     heard: Callable[["RangerLink", Reply], None] | None = None
     commanded: Callable[[SentCommand], None] | None = None
+    health: Callable[[RangerHealth], None] | None = None
 
 
 class RangerLink:
@@ -80,11 +92,13 @@ class RangerLink:
         self.names = {number: name for name, number in self.preparation.numbers.items()}
         self.state: State = "down"
         self.sampling = SamplingSettings()
+        self.wanted_sampling: SamplingSettings | None = None  # None: as the ranger has it
         self.counts: tuple[float, float] | None = None
         self.busy, self.shots, self.failures = False, 0, 0  # failures in a row
         self.round_trip = float("nan")
         self._guard, self._clock = guard, clock
-        self._heard_by, self._commanded = listeners.heard, listeners.commanded
+        self._heard_by, self._commanded, self._health_to = listeners.heard, listeners.commanded, listeners.health
+        self._health_at = 0.0
         self.settings = settings or LinkSettings()
         self._event_log = EventLog(ranger, clock, listeners.tell)
         self._shooter = Shooter(self, self._event_log, clock)
@@ -167,7 +181,7 @@ class RangerLink:
         client = self._client
         if client is None:
             return why
-        self.state = "connected"
+        self.state, self._health_at = "connected", asyncio.get_running_loop().time()
         self._event_log.standing("lost", None, over=f"{self.ranger} is connected")
         renewing = asyncio.ensure_future(self._renew(client))
         try:
@@ -255,7 +269,29 @@ class RangerLink:
                 await self._ask(Request("STI", (stamp_text(right),)), self.settings.probe_timeout)
             if self.state == "ready" and self.status & StatusWord.LASER_OFF:  # switched off by the ranger itself
                 await self._light()
+        if self._health_to is not None and (idle or not self.busy) and loop.time() - self._health_at >= HEALTH_EVERY:
+            self._health_at = loop.time()
+            await self._look_at_health(self._health_to)
         return True
+
+    async def _look_at_health(self, tell: Callable[[RangerHealth], None]) -> None:
+        found = await asked_health(lambda request: self._ask(request, self._probe_timeout))
+        if found.ticks is None:
+            return
+        tell(
+            RangerHealth(
+                ticks=found.ticks,
+                ranger=self.ranger,
+                state=self.state,
+                laser=found.laser,
+                supplies=found.supplies,
+                temperature_c=found.temperature_c,
+                errors=found.errors,
+                status=self.status,
+                clock_offset=self.clock_offset,
+                round_trip=self.round_trip,
+            )
+        )
 
     async def _light(self) -> None:
         """Switch the laser on, from ZRG inside the instrument if refused.
@@ -499,9 +535,27 @@ class RangerLink:
             if since > self.settings.probe_every and not await self._lives(idle=True):
                 self._doubt.set()
                 return 0
+            if not await self._sampled():
+                return 0
             return await self._shooter.stream(planned, take, count=count)
         finally:
             self.busy = False
+
+    async def _sampled(self) -> bool:
+        """Send the wanted sampling if the ranger has another; True if it has it now."""
+        wanted = self.wanted_sampling
+        if wanted is None or wanted == self.sampling:
+            return True
+        for request in sampling_requests(self.sampling, wanted):
+            reply = await self._ask(request, PATIENCE)
+            if reply.ok is not True:
+                self.failures += 1
+                self.sampling = await sampling_of(self._ask) if self.connected else self.sampling
+                text = f"{self.ranger}: {request.command} {request.parameters[0]}: {reply.text[:160]}"
+                self._event_log.tell("sampling-refused", text, "warning")
+                return False
+        self.sampling = wanted
+        return True
 
     async def tell_sun(self, vector: Sequence[float]) -> None:
         """Send the unit vector to the Sun, in its frame."""

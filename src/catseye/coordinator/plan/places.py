@@ -12,6 +12,7 @@ from catseye.coordinator.parts import PlannedShot, SiteState
 from catseye.coordinator.visibility.surroundings import later
 from catseye.coordinator.visibility.vantage import SeenRetroreflector, Vantage, nominal_posture
 from catseye.geometry.antenna.frames import ground_from_reflector_at
+from catseye.geometry.frames.frame import Transform
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture
 from catseye.records.site.folder import REFERENCE, SiteFolder
 
@@ -50,6 +51,7 @@ class Places:
         self.site, self.vantages, self.retros, self.state, self.ticks = site, vantages, retros, state, ticks
         self._predicted: dict[str, tuple[Array, Array]] = {}
         self._shifts: dict[str, Array] = {}
+        self._arm_from_dish: Transform | None = None
         self._rotation, self._vertex = self._frames(ticks)
 
     @staticmethod
@@ -123,26 +125,42 @@ class Places:
         if (
             retro.part == "dish" and vantage.frame == "reflector"
         ):  # millimetres are negligible for a beam, and there are many of them
-            return np.broadcast_to(retro.point, (len(self.ticks), 3)) - self.shift(vantage)
+            return np.broadcast_to(self._on_arm(retro.point), (len(self.ticks), 3)) - self.shift(vantage)
         if name not in self._predicted:
             at = self._place(name, self.ticks)
             self._predicted[name] = at, self._in_reflector(at, self._rotation, self._vertex)
         ground, reflector = self._predicted[name]
         return ground if vantage.frame == "ground" else reflector - self.shift(vantage)
 
+    def _on_arm(self, point: Array) -> Array:
+        """Dish point (3,) m in the frame of the arm's rangers, in the middle of the round.
+
+        Itself on a rigid telescope; a structural model turns and shifts the arm against the dish by centimetres.
+        """
+        if self._arm_from_dish is None:
+            return point
+        return self._arm_from_dish.points(point)
+
     def _place(self, name: str, ticks: ArrayLike) -> Array:
         return np.asarray(self.state.place(name, np.asarray(ticks, dtype=float) / TICKS_PER_DAY), dtype=float)
 
     def _frames(self, ticks: ArrayLike) -> tuple[Array, Array]:
-        """Axes (k, 3, 3) and vertex (k, 3), m, of the reflector, ground frame.
+        """Axes (k, 3, 3) and vertex (k, 3), m, of the reflector frame of the arm's rangers, ground frame.
 
-        The posture's rates are assumed constant.
+        The posture's rates are assumed constant. With a structural model the frame rides and turns with the arm.
         """
         posture, reflector = self.state.posture, self.site.site.frames.reflector
         since = (np.asarray(ticks, dtype=float) - posture.ticks) * TICK_SECONDS
+        azimuth = posture.azimuth + posture.azimuth_rate * since
+        elevation = posture.elevation + posture.elevation_rate * since
+        if self.state.bent_frame is not None:
+            arm, dish = (self.state.bent_frame(part, azimuth, elevation) for part in ("arm", "dish"))
+            middle = len(since) // 2
+            self._arm_from_dish = (arm.inverse() @ dish)[middle].single
+            return np.asarray(arm.rotation), np.asarray(arm.translation)
         ground_from_reflector = ground_from_reflector_at(
-            posture.azimuth + posture.azimuth_rate * since,
-            posture.elevation + posture.elevation_rate * since,
+            azimuth,
+            elevation,
             elevation_axis_height=reflector.elevation_axis_height_mm * MILLIMETRE,
             reflector_to_elevation=np.array(reflector.reflector_to_elevation_mm) * MILLIMETRE,
         )

@@ -44,6 +44,7 @@ class RoundSettings:
     duration          of a buffer
     reference_every   and benchmark_every: longest intervals
     dish_share        share of a feed-arm ranger's round for the dish
+    interval          shortest time between the starts of two buffers of a ranger
     sigma             of a range
     drift             process noise of points, per square root of a second
     """
@@ -58,6 +59,7 @@ class RoundSettings:
     dish_share: float = 0.5
     sigma: float = SIGMA
     drift: float = 30e-6
+    interval: float = 0.05
 
 
 @dataclass(eq=False)
@@ -67,6 +69,7 @@ class _Turn:
     points, variance   of the table's rows: index of the point (-1: none), and variance of a range to it, m^2
     until              s, end of the time for shots chosen by value
     counted, open_     rows chosen by value, and those of them not yet shot in this pass
+    factor             of the worth of a shot on each row
     row, at            present row of the mirror, and since when, s
     """
 
@@ -78,6 +81,7 @@ class _Turn:
     until: float
     counted: NDArray[np.bool_]
     open_: NDArray[np.bool_]
+    factor: Array
     row: int = 0
     at: float = 0.0
     chosen: list[ChosenTarget] = field(default_factory=list)
@@ -91,6 +95,9 @@ class RoundPlanner:
     keep_clear   Sun and boxes; the site's Sun without boxes if None
     solids       obstacles
     settings     of rounds
+
+    `scan_list` has the names that are measured besides ZRG and benchmarks, None: all; `priorities` the factors of the
+    worth of shots, by name.
     """
 
     def __init__(
@@ -121,6 +128,8 @@ class RoundPlanner:
         }
         self._in_dish, self._started = in_dish, False
         self._visited: set[str] = set()
+        self.scan_list: frozenset[str] | None = None
+        self.priorities: dict[str, float] = {}
 
     def round(self, state: SiteState) -> Round:
         """Next round, from `state.now_ticks` plus the lead.
@@ -168,7 +177,7 @@ class RoundPlanner:
         are visited.
         """
         at_hand = [raster for name, raster in self.rasters.items() if name in ready]
-        if self._visited.issuperset(n for raster in at_hand for n in raster.names):
+        if self._visited.issuperset(n for raster in at_hand for n in raster.names if self._listed(n)):
             self._visited.clear()
         if self._started:
             return
@@ -182,8 +191,13 @@ class RoundPlanner:
         ZRG first, its benchmark, then what it sees.
         """
         bench = self._benchmarks.get(vantage.name)
-        names = [REFERENCE, *([bench] if bench else []), *(n for n in visible if n not in self._in_dish)]
+        others = (n for n in visible if n not in self._in_dish and self._listed(n))
+        names = [REFERENCE, *([bench] if bench else []), *others]
         return tuple(n for n in names if (vantage.name, n) not in state.suspended)
+
+    def _listed(self, target: str) -> bool:
+        """True for a target of the scan list."""
+        return self.scan_list is None or target in self.scan_list
 
     def _knowledge(self, names: list[str], state: SiteState) -> Knowledge:
         """Covariances of points before the round.
@@ -223,6 +237,7 @@ class RoundPlanner:
             until=share * s.period,
             counted=counted,
             open_=counted.copy(),
+            factor=np.array([self.priorities.get(n, 1.0) for n in table.names]),
         ), why
 
     def _due(self, turn: _Turn, state: SiteState, begin: int) -> None:
@@ -249,12 +264,18 @@ class RoundPlanner:
         begin = turn.at + float(turn.table.moving[turn.row, row]) + self.settings.settle
         turn.open_[row] = False
         turn.chosen.append(ChosenTarget(turn.table.names[row], begin, reason, turn.table.via(turn.row, row)))
-        turn.row, turn.at = row, begin + self.settings.duration + self.settings.transfer
+        turn.row, turn.at = row, begin + self._after
+
+    @property
+    def _after(self) -> float:
+        """s from the start of a buffer to the next move."""
+        s = self.settings
+        return max(s.duration + s.transfer, s.interval - s.settle)
 
     @property
     def _a_shot(self) -> float:
         """s that a shot takes besides its move."""
-        return self.settings.settle + self.settings.duration + self.settings.transfer
+        return self.settings.settle + self._after
 
     def _by_worth(self, turns: dict[str, _Turn], know: Knowledge) -> None:
         queue = [(turn.at, name) for name, turn in turns.items()]
@@ -270,7 +291,7 @@ class RoundPlanner:
             while len(rows := self._open(turn)):
                 cost = turn.table.moving[turn.row, rows] + self._a_shot
                 worth = know.worth(turn.points[rows], turn.table.units[rows], turn.variance[rows])
-                best = int(np.argmax(worth.gain / cost))
+                best = int(np.argmax(worth.gain * turn.factor[rows] / cost))
                 row = int(rows[best])
                 if turn.table.may(turn.row, row, turn.around) is None:
                     before, after = know.learn(int(turn.points[row]), worth.across[best], float(worth.total[best]))
@@ -300,6 +321,7 @@ class RoundPlanner:
         suspended = frozenset(t for r, t in state.suspended if r == name)
         position = turn.table.middle[turn.row]
         raster = self.rasters[name]
+        unlisted = {n for n in raster.names if not self._listed(n)}
         chosen, why = raster.stretch(
             position,
             s.period - turn.at,
@@ -307,7 +329,7 @@ class RoundPlanner:
             shot_seconds=self._a_shot,
             shift=places.shift(turn.vantage),
             left_alone=suspended,
-            visited=self._visited,
+            visited=self._visited | unlisted,
         )
         self._visited.update(raster.names[i] for i, _ in chosen)
         turn.chosen += [ChosenTarget(raster.names[i], turn.at + moved + s.settle, "dish raster") for i, moved in chosen]

@@ -141,8 +141,13 @@ class KeepClear:
     """
 
     def __init__(self, site: SiteFolder, keep_out: KeepOut | None = None, place: FramePlace | None = None):
-        self.site, self.keep_out = site, keep_out or KeepOut()
+        self.site = site
         self.place = place or place_of(site.site.site)
+        self.adopt(keep_out or KeepOut())
+
+    def adopt(self, keep_out: KeepOut) -> None:
+        """Use other boxes, another cone and other margins from now on."""
+        self.keep_out = keep_out
         self.boxes = self.keep_out.boxes()
         self._whole = _table([(b.centre, 0.5 * float(np.linalg.norm(b.size))) for b in self.boxes])
         self._parts = [_table(_pieces(b)) for b in self.boxes]

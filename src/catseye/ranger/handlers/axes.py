@@ -1,4 +1,7 @@
-"""Commands of the axes: moves, filters, homing, waiting. See `ranger.handlers.table`."""
+"""Commands of the axes: moves, filters, homing, waiting. See `ranger.handlers.table`.
+
+Source: [PARKER04] section 6.4.3.
+"""
 
 from collections.abc import Callable, Generator
 

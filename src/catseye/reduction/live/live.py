@@ -1,7 +1,8 @@
 """Live reduction: weather, postures and shots to a solution per epoch.
 
-It uses no clock, network or file, and its answers depend on its input alone: a journal replayed in order gives the same
-answers bit for bit.
+With a structural model the site's telescope bends: places in the state are those at rest, poses what remains beyond
+the model. It uses no clock, network or file, and its answers depend on its input alone: a journal replayed in order
+gives the same answers bit for bit.
 """
 
 import math
@@ -17,14 +18,18 @@ from threadpoolctl import threadpool_limits
 from catseye.aliases import Array
 from catseye.constants import DEGREE, MILLIMETRE, SECONDS_PER_DAY, SPEED_OF_LIGHT, TWO_PI
 from catseye.errors import CatseyeError
+from catseye.geometry.frames.frame import Transforms
 from catseye.records.night.live import TICK_SECONDS, TICKS_PER_DAY, LivePosture, LiveShot, LiveWeather
 from catseye.records.site.folder import REFERENCE, SiteFolder
 from catseye.records.site.target import FeedArmRanger, TargetRow
 from catseye.records.site.triplet import TripletRecord
+from catseye.reduction.epoch.contradictions.contradiction import Contradiction, RecordGroup
+from catseye.reduction.epoch.notes import contradiction_text
 from catseye.reduction.epoch.parameter import GRADIENT, POINT_KINDS, Parameter, ParameterKind
 from catseye.reduction.epoch.ranges import MRAD_PER_ROOT_HOUR
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
+from catseye.reduction.live.changes import LiveChange, placed, without_points, without_velocities
 from catseye.reduction.live.epoch import Epoch, frames_of_points, observed_site, solve_epoch
 from catseye.reduction.live.jitter import Jitter
 from catseye.reduction.live.pose import LivePose, live_pose
@@ -46,13 +51,16 @@ from catseye.reduction.live.weather import BiasedPeriod, StationWatch
 from catseye.reduction.site.bodies import bodies_of, tracked_names
 from catseye.reduction.site.motion import (
     LONGEST_GAP,
+    REFLECTOR,
     PostureTrack,
     TelescopeCarrier,
+    bent_ground_from,
     carried_point,
     frames_of,
     ground_from,
 )
 from catseye.reduction.site.places import places_of
+from catseye.reduction.structure.site_bending import RememberedBending, bending_of, displaced_site, refuse_narrow_model
 
 Typed = TypeVar("Typed", TargetRow, TripletRecord, FeedArmRanger)  # records with a typed position
 FIRST_INDEX = 1.00028  # group index before the first epoch, good to 5e-5: 6 mm at 120 m, enough for whole cycles
@@ -110,6 +118,7 @@ class EpochAnswer:
     biases        station: suspected bias of its thermometer; stations that are not used at all are absent
     returned      biased periods of stations, recognised since the last epoch as having ended
     ranges        columns of the epoch's ranges, see `range_columns`; journalled beside the answer
+    reference     number of the epoch to which the pose refers; 0 before there is one
     """
 
     number: int
@@ -134,6 +143,7 @@ class EpochAnswer:
     biases: Mapping[str, SuspectedBias] = field(default_factory=dict)
     returned: tuple[BiasedPeriod, ...] = ()
     ranges: RangeColumns = field(default_factory=dict)
+    reference: int = 0
 
     def point(self, name: str) -> tuple[Array, Array]:
         """Position (3,) m of a point, and covariance (3, 3).
@@ -173,7 +183,7 @@ class EpochJob:
                     site, rows, self.weather, azimuth=self.azimuth, elevation=self.elevation, mjd=self.motion.epoch
                 )
                 return solve_epoch(
-                    observed,
+                    displaced_site(observed),
                     rows,
                     self.motion,
                     settings=self.rules,
@@ -192,19 +202,27 @@ class EpochJob:
         return self.motion.distances(ranger, target, self.places, mjd)
 
 
+READINGS = {RecordGroup.THERMOMETERS, RecordGroup.SOUND, RecordGroup.PRESSURE, RecordGroup.HUMIDITY}
+
+
 class Live:
     """A live site's reduction; see the module."""
 
     def __init__(self, site: SiteFolder, settings: LiveSettings | None = None):
         self.settings = settings or LiveSettings()
-        self.site = _with_flexure(site, self.settings)
+        self.site = self._recorded = _with_flexure(site, self.settings)
         self.frames = frames_of(site)
+        bending = bending_of(site)
+        self.bending = None if bending is None else RememberedBending(bending)
+        if self.bending is not None:
+            refuse_narrow_model(self.bending)
         self.bodies = bodies_of(site, self.frames)
         self.lasting = tracked_names(site)
         self.track = PostureTrack()
         self.stations = StationWatch.of(site)
         self._opened: frozenset[str] = frozenset()  # stations whose thermometer priors no longer affect the state
         self._pulls: dict[Parameter, float] = {}  # prior errors' effect in the last epoch
+        self._contradicted: tuple[str, ...] = ()  # records of the site that an epoch contradicted: they stay wrong
         self._reported: set[BiasedPeriod] = set()
         self.jitter = Jitter(self.settings.jitter_mm)
         self.rangers = {name: RangerHistory() for name in site.rangers}
@@ -217,6 +235,10 @@ class Live:
         self._local: dict[str, Array] = _local_places(self.site, self.frames)
         self._constants = {name: place.constant for name, place in places_of(self.site).items()}
         self._index = FIRST_INDEX
+        self._moved: dict[str, tuple[float, float, float]] = {}  # mm, positions that replace the records'
+        self.reference_number = 0  # epoch to which poses refer; 0 before there is one
+        self._solving = False  # an epoch was begun and not accepted
+        self._waiting: list[LiveChange] = []  # changes for its end
 
     # Input ---------------------------------------------------------------------------------------------
 
@@ -286,6 +308,17 @@ class Live:
         if self.state is not None and self.state.ticks > ticks:
             self.state = replace(self.state, ticks=ticks)
 
+    def change(self, change: LiveChange) -> None:
+        """Change the reduction: at once, or when the epoch that is being solved has been accepted.
+
+        Raises InputError: a position for something that is not a target.
+        """
+        if change.positions_mm is not None:
+            placed(self.site, self._recorded, change.positions_mm)
+        self._waiting.append(change)
+        if not self._solving:
+            self._apply_changes()
+
     def place(self, name: str, mjd: ArrayLike) -> Array:
         """Predicted position (..., 3) m, ground frame, at times (...).
 
@@ -295,7 +328,23 @@ class Live:
         times = np.asarray(mjd, dtype=float)
         if frame == "ground":
             return np.broadcast_to(local, (*times.shape, 3)).copy()
-        return np.asarray(ground_from(self.site, frame, *self.track.at(times)).points(local))
+        return np.asarray(self._ground_from(name, *self.track.at(times)).points(local))
+
+    def bent_frame(self, part: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
+        """Transform to ground from the reflector frame as a part of it is bent, at postures (...), rad.
+
+        part   "arm", whose rangers ride and turn with it, or "dish"; without a model the rigid telescope's
+        """
+        body = "" if self.bending is None else self.bending.frame_of(part)
+        return bent_ground_from(self.site, REFLECTOR, body, azimuth, elevation, self.bending)
+
+    def _ground_from(self, name: str, azimuth: ArrayLike, elevation: ArrayLike) -> Transforms:
+        """Transform to ground from a point's frame, where it is at rest."""
+        return bent_ground_from(self.site, self.frames[name], self._body(name), azimuth, elevation, self.bending)
+
+    def _body(self, name: str) -> str:
+        """Name shared by points that move as one."""
+        return self.frames[name] if self.bending is None else self.bending.body(name)
 
     def uncertainty(self) -> dict[str, Array]:
         """Covariance (3, 3) m^2 of each point of the state.
@@ -327,10 +376,12 @@ class Live:
         `failed` says why there is no job. Shots stay for the next epoch if weather or posture is missing. Between
         `begin` and `accept` more shots may be added; they belong to the next epoch.
         """
+        self._apply_changes()
         weather = self.stations.trusted_readings(ticks)
         self.failed = self._unready(weather)
         if self.failed:
             return None
+        self._solving = True
         rows, self._pending = self._rows(ticks), []
         mjd = ticks / TICKS_PER_DAY
         azimuth, elevation = (float(v) for v in self.track.at(mjd))
@@ -344,6 +395,7 @@ class Live:
             bodies=self.bodies,
             jitter_mm=self._shaking(rows),
             lasting=self.settings.lasting_path,
+            bending=None if self.bending is None else self.bending.bending,
         )
         names = {name for r in rows for name in (r.shot.ranger, r.shot.target)} & self._local.keys()
         places = {name: self._local[name] for name in sorted(names)}
@@ -366,10 +418,14 @@ class Live:
 
     def accept(self, job: "EpochJob", epoch: "Epoch | str") -> EpochAnswer | None:
         """Adopt the result of `job.solve()`; None if it failed, see `failed`."""
-        if isinstance(epoch, str):
-            self.failed = epoch
-            return None
-        return self._accept(epoch, job.motion, job.azimuth, job.elevation)
+        try:
+            if isinstance(epoch, str):
+                self.failed = epoch
+                return None
+            return self._accept(epoch, job.motion, job.azimuth, job.elevation)
+        finally:
+            self._solving = False
+            self._apply_changes()
 
     def solve(self, ticks: int) -> EpochAnswer | None:
         """Run `begin`, `EpochJob.solve` and `accept` in one call."""
@@ -380,8 +436,35 @@ class Live:
         """Make the last epoch the reference epoch of poses."""
         if self.state is not None:
             self.state = with_reference(self.state, self._moving())
+            self.reference_number = self.number
 
     # Inside ----------------------------------------------------------------------------------------------------------
+
+    def _apply_changes(self) -> None:
+        """Apply the changes that wait, in order."""
+        waiting, self._waiting = self._waiting, []
+        for change in waiting:
+            rules = change.rules(self.settings.reduction)
+            self.settings = replace(self.settings, reduction=rules, filter=change.filter or self.settings.filter)
+            if self.settings.filter == "random_walk" and self.state is not None:
+                self.state = without_velocities(self.state)
+            if change.positions_mm is not None:
+                self._move(dict(change.positions_mm))
+            if change.reference:
+                self.set_reference()
+
+    def _move(self, positions_mm: dict[str, tuple[float, float, float]]) -> None:
+        """Begin targets anew whose approximate position is another one now."""
+        before, self._moved = self._moved, positions_mm
+        names = [n for n in sorted({*before, *positions_mm}) if before.get(n) != positions_mm.get(n)]
+        if not names:
+            return
+        self.site = placed(self.site, self._recorded, positions_mm)
+        local = _local_places(self.site, self.frames)
+        self._local |= {name: local[name] for name in names}
+        self._lines = {line: solved for line, solved in self._lines.items() if line[1] not in names}
+        if self.state is not None:
+            self.state = without_points(self.state, names)
 
     def _accept(self, epoch: Epoch, motion: TelescopeCarrier, azimuth: float, elevation: float) -> EpochAnswer:
         coordinates = epoch.coordinates
@@ -389,6 +472,7 @@ class Live:
         self.jitter.learn(coordinates.ranges, self.bodies)
         self.state, self.last_ticks = epoch.state, epoch.state.ticks
         self._suspect(epoch)
+        self._remember(coordinates.contradictions)
         frames = frames_of_points(motion, coordinates.points)
         for name, x in zip(coordinates.points, coordinates.x, strict=True):
             self._local[name] = frames[name].inverse().points(x) if name in frames else np.array(x)
@@ -430,11 +514,22 @@ class Live:
             pose=pose,
             notes=(*coordinates.notes, *self.stations.notes()),
             jitter_mm=motion.jitter_mm,
-            doubts=coordinates.doubts,
+            doubts=tuple(dict.fromkeys((*coordinates.doubts, *self._contradicted))),
             biases=epoch.biases,
             returned=self._returned(),
             ranges=range_columns(ranges, rows),
+            reference=self.reference_number,
         )
+
+    def _remember(self, contradictions: Sequence[Contradiction]) -> None:
+        """Store contradictions with records of the site.
+
+        The state knows better since, so that later epochs contradict nothing; readings may be right again.
+        """
+        lasting = [
+            contradiction_text(c, self.site) for c in contradictions if not {e.group for e in c.explanations} & READINGS
+        ]
+        self._contradicted = tuple(dict.fromkeys((*self._contradicted, *lasting)))
 
     def _suspect(self, epoch: Epoch) -> None:
         """Store an epoch's suspicions about the thermometers.
@@ -543,17 +638,29 @@ class Live:
             {self.frames[shot.ranger], self.frames[shot.target]} != {"ground"} and not len(self.track)
         ):
             return math.nan, 0.0
-        if self.frames[shot.ranger] == self.frames[shot.target]:
+        if self._body(shot.ranger) == self._body(shot.target):
             return float(np.linalg.norm(self._local[shot.target] - self._local[shot.ranger])), 0.0
         half = 0.5 * shot.duration / SECONDS_PER_DAY
-        first, middle, last = (self._length(shot, shot.middle_mjd + dt) for dt in (-half, 0.0, half))
+        ends = [self._bent_place(n, shot.middle_mjd) for n in (shot.ranger, shot.target)]
+        first, middle, last = (self._length(shot, ends, shot.middle_mjd + dt) for dt in (-half, 0.0, half))
         return middle, (last - first) / shot.duration
 
-    def _length(self, shot: LiveShot, mjd: float) -> float:
+    def _bent_place(self, name: str, mjd: float) -> Array:
+        """Place (3,) m in its frame as the telescope is bent in the middle of a buffer.
+
+        During it the bending changes by 0.03 mm at most: 0.3 m/rad at 0.01 rad/s.
+        """
+        if self.bending is None or not self._body(name):
+            return self._local[name]
+        azimuth, elevation = self.track.angles(mjd)
+        rigid = ground_from(self.site, self.frames[name], azimuth, elevation)
+        return rigid.inverse().points(self._ground_from(name, azimuth, elevation).points(self._local[name]))
+
+    def _length(self, shot: LiveShot, ends: Sequence[Array], mjd: float) -> float:
         azimuth, elevation = self.track.angles(mjd)
         a, b = (
-            carried_point(self.site, self.frames[n], self._local[n], azimuth, elevation)
-            for n in (shot.ranger, shot.target)
+            carried_point(self.site, self.frames[n], end, azimuth, elevation)
+            for n, end in zip((shot.ranger, shot.target), ends, strict=True)
         )
         return math.dist(a, b)
 

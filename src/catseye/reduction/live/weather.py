@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from catseye.atmosphere.weather.humidity import humidity_doubts
 from catseye.constants import SECONDS_PER_DAY
 from catseye.records.night.live import TICKS_PER_DAY, LiveWeather
 from catseye.records.site.folder import SiteFolder
 from catseye.reduction.epoch.allowance import STEEPEST_DOWN, STEEPEST_UP
+from catseye.reduction.site.plausible.readings import LEAST_READINGS, TEMPERATURE, stuck
+from catseye.reduction.site.plausible.weather import humidity_doubt, pressure_doubt
 
 HISTORY = 7200.0  # s, of readings kept
 SILENT = 1800.0  # s after its last reading, when a station is no longer used
@@ -49,6 +50,7 @@ class BiasedPeriod:
 class _Station:
     name: str
     height: float
+    elevation: float | None = None  # above the sea; None where no record gives it
     last: LiveWeather | None = None  # accepted or not: its own change can still be compared
     good: deque[LiveWeather] = field(default_factory=deque)
     level_since: int | None = None  # of the first reading at this level
@@ -60,6 +62,7 @@ class _Station:
     witnesses: dict[str, float] = field(default_factory=dict)  # others' °C when it was first rejected
     bias: tuple[float, bool] = (math.nan, False)  # °C too high as an epoch suspects, and True if from the ranges
     waiting: list[LiveWeather] = field(default_factory=list)  # readings that look like the end of a bias
+    stuck_since: int | None = None  # ticks of the first repeated reading of a sensor that is stuck
     stretches: deque[BiasedPeriod] = field(default_factory=lambda: deque(maxlen=MOST_STRETCHES))
 
 
@@ -71,7 +74,8 @@ class StationWatch:
     """
 
     def __init__(self, names: tuple[str, ...], heights: Mapping[str, float] | None = None):
-        self._stations = {name: _Station(name, (heights or {}).get(name, 0.0)) for name in names}
+        known = heights or {}
+        self._stations = {name: _Station(name, known.get(name, 0.0), known.get(name)) for name in names}
         self._moved: set[str] = set()
 
     @staticmethod
@@ -84,8 +88,9 @@ class StationWatch:
         """Add one reading; return the reason for rejection, else "".
 
         Rejected: a missing or impossible value, a time before the last, a temperature that has left the station's own
-        median of five minutes by 1.5 °C more than the other stations have left theirs, and one that contradicts all of
-        two or more others which agree with each other. A step that removes the offset suspected by an epoch ends the
+        median of five minutes by 1.5 °C more than the other stations have left theirs, one that contradicts all of
+        two or more others which agree with each other, and one that repeats the last for longer than the series' own
+        scatter allows. A step that removes the offset suspected by an epoch ends the
         bias: from the third such reading on the station is accepted, and its readings before are not.
         """
         station = self._stations.get(read.station)
@@ -106,7 +111,7 @@ class StationWatch:
                 return ""
         else:
             station.waiting.clear()
-        station.doubt = self._jump(read, station) or self._odd(read, station)
+        station.doubt = self._stuck(read, station) or self._jump(read, station) or self._odd(read, station)
         if station.doubt:
             self._disbelieve(read, station)
             return station.doubt
@@ -125,6 +130,7 @@ class StationWatch:
                 station.level_since = None
             if station.doubted_since is not None and station.doubted_since > ticks:
                 station.doubted_since, station.doubt, station.odd = None, "", False
+                station.stuck_since = None
                 station.witnesses.clear()
             periods = [s for s in station.stretches if s.first <= ticks]
             station.stretches = deque(
@@ -179,12 +185,8 @@ class StationWatch:
     def notes(self) -> tuple[str, ...]:
         """Problems of stations now, in words."""
         jumped = [s.doubt for s in self._stations.values() if s.doubted_since is not None]
-        humid = [
-            f"{name}: {text}"
-            for name, s in self._stations.items()
-            for text in humidity_doubts([read.humidity_percent for read in s.good])
-        ]
-        return (*jumped, *humid)
+        levels = [f"{s.name}'s {text}" for s in self._stations.values() if s.good for text in _implausible_levels(s)]
+        return (*jumped, *levels)
 
     # Inside ----------------------------------------------------------------------------------------------------------
 
@@ -195,6 +197,9 @@ class StationWatch:
         if station.odd and not station.passed and station.good:  # since its first reading
             station.doubted_since = station.good[0].ticks
             station.good.clear()
+        since = station.stuck_since
+        while since is not None and station.good and station.good[-1].ticks >= since:
+            station.doubted_since = station.good.pop().ticks
 
     def _believe(self, read: LiveWeather, station: _Station) -> None:
         if station.doubted_since is not None:
@@ -229,6 +234,7 @@ class StationWatch:
         station.good = deque(station.waiting)
         station.waiting = []
         station.doubted_since, station.doubt, station.odd = None, "", False
+        station.stuck_since = None
         station.witnesses.clear()
         self._at_a_new_level(station, first.ticks)
 
@@ -245,6 +251,26 @@ class StationWatch:
         if abs(step + offset) > UNDONE * abs(offset):
             return False
         return bool(station.waiting) or abs(read.temperature_c - before.temperature_c) > UNDONE * abs(offset)
+
+    def _stuck(self, read: LiveWeather, station: _Station) -> str:
+        """Reason if the sensor repeats itself for too long, else ""."""
+        if not station.good or station.good[-1].temperature_c != read.temperature_c:
+            station.stuck_since = None
+            return ""
+        if station.stuck_since is None:
+            readings = [*station.good, read]
+            if any(r.temperature_c != read.temperature_c for r in readings[-LEAST_READINGS:]):
+                return ""
+            seconds = np.array([_seconds(r.ticks - readings[0].ticks) for r in readings])
+            runs = stuck(seconds, np.array([r.temperature_c for r in readings]), TEMPERATURE)
+            if not runs or runs[-1].last != len(readings) - 1:
+                return ""
+            station.stuck_since = readings[runs[-1].first + 1].ticks
+        minutes = _seconds(read.ticks - station.stuck_since) / 60.0
+        return (
+            f"{read.station} has read {read.temperature_c:.2f} C for {minutes:.0f} min, longer than its own scatter "
+            "allows: its sensor is stuck, rejected"
+        )
 
     def _jump(self, read: LiveWeather, station: _Station) -> str:
         level = _median(station)
@@ -308,6 +334,15 @@ class StationWatch:
         lately = [c for s in self._other_stations(station) if (c := _change(s, read.ticks)) is not None]
         changes = since or lately
         return float(np.median(changes)) if changes else 0.0
+
+
+def _implausible_levels(station: _Station) -> list[str]:
+    """Doubts on the pressure and humidity of a station's recent readings."""
+    doubts = [("hygrometer", humidity_doubt(np.array([read.humidity_percent for read in station.good])))]
+    if station.elevation is not None:
+        pressure = float(np.median([read.pressure_hpa for read in station.good]))
+        doubts.append(("barometer", pressure_doubt(pressure, station.elevation)))
+    return [f"{instrument} {text}" for instrument, text in doubts if text]
 
 
 def _excess(difference: float, rise: float, spare: float) -> float:

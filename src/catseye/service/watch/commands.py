@@ -13,7 +13,7 @@ from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.service.watch.entries import Object, mjd_of
 
-COMMANDING = ("MODE", "DROP", "TAKE", "STREAM", "SET", "PREPARE", "START", "CLOCK")
+COMMANDING = ("MODE", "DROP", "TAKE", "STREAM", "SET", "PREPARE", "START", "DISCARD", "CLOCK", "REFERENCE", "MOVED")
 IDLE = 60.0  # s without a command after which a lease is given back, and a console closed
 LOOK = 5.0  # s between two looks for idle ones
 PATIENCE = 5.0  # s for a coordinator's answer

@@ -19,6 +19,7 @@ from catseye.service.watch.entries import (
     WEATHER,
     Object,
     columns,
+    keyed,
     mjd_of,
     numbers,
     words,
@@ -246,14 +247,12 @@ class History:
                 if posture is None:
                     high = first_seq(connection, "postures", run, ticks + 1)
                     row = connection.execute(LAST_POSTURE, {"run": run, "high": high}).first()
-                    posture = (
-                        None if row is None else dict(zip(POSTURE, (mjd_of(row[0]), *numbers(row[1:])), strict=True))
-                    )
+                    posture = None if row is None else keyed(POSTURE, (mjd_of(row[0]), *numbers(row[1:])))
                 high = first_seq(connection, "weather", run, ticks + 1)
                 for read, station, *values in connection.execute(LAST_WEATHER, {"run": run, "high": high}):
                     name = words(station)
                     row_values = (mjd_of(read), name, *numbers(values))
-                    weather.setdefault(name, dict(zip(WEATHER, row_values, strict=True)))
+                    weather.setdefault(name, keyed(WEATHER, row_values))
             if posture is not None and weather:
                 break
         return posture, [weather[name] for name in sorted(weather)]
@@ -300,7 +299,7 @@ def _ranger(name: str, shot: Object | None, at: float) -> Object:
 def shot_object(row: Sequence[Any]) -> Object:
     """Shot of a row in the order of `LAST_SHOT`."""
     count, ticks, ranger, target, status, *values = row
-    return dict(zip(SHOT, (count, mjd_of(ticks), *map(words, (ranger, target, status)), *numbers(values)), strict=True))
+    return keyed(SHOT, (count, mjd_of(ticks), *map(words, (ranger, target, status)), *numbers(values)))
 
 
 def least_severities(severity: str | None) -> tuple[str, ...]:

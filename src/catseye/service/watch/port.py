@@ -7,15 +7,15 @@ from contextlib import suppress
 from typing import Any
 
 from catseye.clock import Clock
-from catseye.coordinator.clients.samplers import RING_LENGTH
 from catseye.coordinator.condition import SIGNS
 from catseye.coordinator.parts import ticks_now
+from catseye.coordinator.samplers.rings import RING_LENGTH
 from catseye.errors import InputError
 from catseye.ranger.client import ZyClient
 from catseye.ranger.line import Reply, parse_stamp
 from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY
-from catseye.service.watch.entries import EPOCH, EVENT, POSTURE, SHOT, WEATHER, Object, mjd_of, number
+from catseye.service.watch.entries import EPOCH, EVENT, POSTURE, SHOT, WEATHER, Object, keyed, mjd_of, number
 from catseye.service.watch.recent import RecentPast
 
 POLL = 1.0  # s between two polls
@@ -173,6 +173,20 @@ class SitePort:
                 if reply.ok and len(reply.values) > 2:
                     self._take(_pushed(name, reply), new=False)
         self._wanted_points.set()
+
+    async def answers(self, command: str, *parameters: object) -> list[Reply]:
+        """All replies to a question.
+
+        Raises InputError: refused, or not answered.
+        """
+        try:
+            replies = await self._all(self.client, command, *parameters)
+        except Silent as problem:
+            raise InputError(str(problem)) from problem
+        refused = next((reply for reply in replies if reply.ok is False), None)
+        if refused is not None:
+            raise InputError(refused.text or f"{command} was refused without a reason")
+        return replies
 
     async def _polls(self, client: ZyClient) -> None:
         loop = asyncio.get_running_loop()
@@ -361,7 +375,7 @@ def _whole(text: str) -> int | None:
 
 def _shot(mjd: float | None, v: tuple[str, ...]) -> Object:
     values = (_whole(v[0]), mjd, v[1], v[2], v[3], *(_float(text) for text in v[4:7]))
-    return dict(zip(SHOT, values, strict=True))
+    return keyed(SHOT, values)
 
 
 def _epoch(mjd: float | None, v: tuple[str, ...]) -> Object:
@@ -369,19 +383,19 @@ def _epoch(mjd: float | None, v: tuple[str, ...]) -> Object:
     verdict = v[9] if len(v) > 9 else None
     counts = (_whole(text) for text in v[1:4])
     values = (_whole(v[0]), mjd, *counts, *(_float(text) for text in v[4:7]), *posture, verdict)
-    return dict(zip(EPOCH, values, strict=True)) | {"verdict_text": None}
+    return keyed(EPOCH, values) | {"verdict_text": None}
 
 
 def _event(mjd: float | None, v: tuple[str, ...]) -> Object:
-    return dict(zip(EVENT, (mjd, *v[:4]), strict=True))
+    return keyed(EVENT, (mjd, *v[:4]))
 
 
 def _posture(mjd: float | None, v: tuple[str, ...]) -> Object:
-    return dict(zip(POSTURE, (mjd, *(_float(text) for text in v[:4])), strict=True))
+    return keyed(POSTURE, (mjd, *(_float(text) for text in v[:4])))
 
 
 def _reading(mjd: float | None, v: tuple[str, ...]) -> Object:
-    return dict(zip(WEATHER, (mjd, v[0], *(_float(text) for text in v[1:4])), strict=True))
+    return keyed(WEATHER, (mjd, v[0], *(_float(text) for text in v[1:4])))
 
 
 _READERS: dict[str, Callable[[float | None, tuple[str, ...]], Object]] = {

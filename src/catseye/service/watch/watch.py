@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from catseye.clock import Clock, SystemClock
 from catseye.coordinator.parts import ticks_now
 from catseye.errors import InputError
+from catseye.ranger.line import Reply
 from catseye.ranger.network import ConnectionMaker
 from catseye.records.night.live import TICKS_PER_DAY
 from catseye.records.site.folder import SiteFolder
@@ -16,6 +17,7 @@ from catseye.service.watch.entries import EVENT, SHOT, Object, rows_to_columns
 from catseye.service.watch.history import History, least_severities, require_limit
 from catseye.service.watch.port import SitePort
 from catseye.service.watch.recent_series import recent_dropped, recent_names, recent_series
+from catseye.service.watch.samplers import parameters_object, sampler_object, samplers_object
 from catseye.service.watch.series import dropped_object, series_names, series_object
 from catseye.service.watch.site_map import SiteMap
 
@@ -156,6 +158,24 @@ class SiteWatch:
         if self._rooms is None:
             self._rooms = Consoles(self._consoles, self._network, self._key)
         return await self._rooms.say(ranger, line, who)
+
+    async def parameters(self) -> Object:
+        """Parameters of the coordinator: value, value that waits, legal values; and their interlocks."""
+        return parameters_object(await self._asked("PARAMETERS"), await self._asked("INTERLOCKS"))
+
+    async def samplers(self) -> Object:
+        """Samplers of the coordinator: values kept, columns."""
+        return samplers_object(await self._asked("SAMPLERS"))
+
+    async def sampler(self, name: str, limit: int = 1) -> Object:
+        """Last values of a sampler as columns, oldest first."""
+        return sampler_object(name.upper(), await self._asked("SAMPLER", name, limit))
+
+    async def _asked(self, command: str, *parameters: object) -> list[Reply]:
+        """Replies of the coordinator; raises InputError where only a journal is watched, or it refuses."""
+        if self.port is None:
+            raise InputError("a journal has no parameters and samplers (expected a living site)")
+        return await self.port.answers(command, *parameters)
 
     def _commands(self) -> CommandDesk:
         """Desk for commands; raises InputError where only a journal is watched."""

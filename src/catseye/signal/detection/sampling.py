@@ -220,19 +220,6 @@ def modulation_response(sampling: SamplingPlan, frequency_hz: ArrayLike) -> NDAr
     return buffer_mean(np.asarray(frequency_hz, dtype=float) / sampling.intermediate_hz, sampling)
 
 
-def jitter_amplitude_factor(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.float64]:
-    """Amplitude factor from independent normal jitter of sample times.
-
-    sampling     IF
-    u_trigger    s, standard uncertainty of each sample's time, 0 or more
-
-    A delay common to all samples turns the phase of target and reference cube alike and cancels.
-
-    Source: mean of exp(i a) over normal a, exp(-var(a)/2), a = 2 pi IF t. Exact.
-    """
-    return np.exp(-0.5 * (TWO_PI * sampling.intermediate_hz * np.asarray(u_trigger, dtype=float)) ** 2)
-
-
 def jitter_u_phase(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.float64]:
     """Standard uncertainty of phase from independent sample jitter, rad.
 
@@ -241,7 +228,7 @@ def jitter_u_phase(sampling: SamplingPlan, u_trigger: ArrayLike) -> NDArray[np.f
 
     With v = (2 pi IF u_trigger)^2 it is sqrt((exp(v) - exp(-v)/2 - 1/2)/mn), about sqrt(3 v/2mn): a sample on a flank,
     where time matters, has the most weight too. For n = 4 it depends on the phase and this is the largest, sqrt(2
-    v/mn).
+    v/mn). A delay common to all samples turns target and reference cube alike and cancels.
 
     Source: variance of the sum 5.2 over the jitter, phasor noise taken as small against the phasor.
 

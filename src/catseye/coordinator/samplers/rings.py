@@ -4,7 +4,7 @@ M&C's archivist reads them.
 """
 
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,25 +12,14 @@ from numpy.typing import NDArray
 
 from catseye.coordinator.condition import verdict_of
 from catseye.coordinator.journal.entries import AnsweredShot, Entry, EpochSolution
+from catseye.coordinator.samplers.columns import COLUMNS
+from catseye.coordinator.samplers.pose_rows import Row, number_word, pose_rows
 from catseye.ranger.line import stamp_text
 from catseye.records.night.live import Happening, LivePosture, LiveWeather
 
 RING_LENGTH = 4096  # values of each sampler
-Row = tuple[str, ...]  # a stamp, then values as sent
-COLUMNS = {
-    "RANGES": ("number", "ranger", "target", "status", "range_m", "u_range_m", "misfit_m"),
-    "EPOCHS": (
-        *("epoch", "points", "shots", "rejected", "variance_factor", "degrees_of_freedom", "refractivity_ppm"),
-        *("azimuth_rad", "elevation_rad", "verdict"),
-    ),
-    "POINTS": (
-        *("epoch", "point", "x_m", "y_m", "z_m"),
-        *("xx_m2", "xy_m2", "xz_m2", "yy_m2", "yz_m2", "zz_m2", "used"),
-    ),
-    "POSTURE": ("azimuth_rad", "elevation_rad", "azimuth_rate_rad_s", "elevation_rate_rad_s"),
-    "WEATHER": ("station", "temperature_c", "pressure_hpa", "humidity_percent"),
-    "EVENTS": ("severity", "who", "kind", "text"),
-}
+MOVED = "actuator-moved"  # kind of the event of another actuator's move
+Listener = Callable[[str, "Row | EpochPoint"], None]  # a sampler, and its new row
 
 
 class Samplers:
@@ -41,15 +30,23 @@ class Samplers:
 
     def __init__(self, length: int = RING_LENGTH):
         self._rings: dict[str, deque[Row | EpochPoint]] = {name: deque(maxlen=length) for name in COLUMNS}
+        self.listeners: list[Listener] = []
 
     def add(self, entry: Entry) -> list[tuple[str, Row]]:
         """Store the rows of an entry; the rows by sampler, without points."""
         rows = list(rows_of(entry))
         for name, row in rows:
-            self._rings[name].append(row)
+            self.put(name, row)
         if isinstance(entry, EpochSolution):
-            self._rings["POINTS"].extend(points_of(entry))
+            for point in points_of(entry):
+                self.put("POINTS", point)
         return rows
+
+    def put(self, name: str, row: "Row | EpochPoint") -> None:
+        """Store a row, and tell it to listeners."""
+        self._rings[name].append(row)
+        for listener in self.listeners:
+            listener(name, row)
 
     def last(self, name: str, count: int) -> list[Row]:
         """Last rows of a sampler, oldest first."""
@@ -66,29 +63,38 @@ def rows_of(entry: Entry) -> Iterable[tuple[str, Row]]:
     """Rows of a journal entry, by sampler."""
     if isinstance(entry, AnsweredShot):
         shot = entry.shot
-        values = (_number(v) for v in (entry.range_, entry.u_range, entry.misfit))
+        values = (number_word(v) for v in (entry.range_, entry.u_range, entry.misfit))
         yield "RANGES", (_stamp(shot.ticks), str(shot.number), shot.ranger, shot.target, plain(entry.status), *values)
     elif isinstance(entry, LivePosture):
-        values = (_number(v) for v in (entry.azimuth, entry.elevation, entry.azimuth_rate, entry.elevation_rate))
+        values = (number_word(v) for v in (entry.azimuth, entry.elevation, entry.azimuth_rate, entry.elevation_rate))
         yield "POSTURE", (_stamp(entry.ticks), *values)
     elif isinstance(entry, LiveWeather):
-        values = (_number(v) for v in (entry.temperature_c, entry.pressure_hpa, entry.humidity_percent))
+        values = (number_word(v) for v in (entry.temperature_c, entry.pressure_hpa, entry.humidity_percent))
         yield "WEATHER", (_stamp(entry.ticks), plain(entry.station), *values)
+    elif isinstance(entry, Happening) and entry.kind == MOVED:
+        yield "MOVES", (_stamp(entry.ticks), *(plain(str(entry.details.get(key, "none"))) for key in COLUMNS["MOVES"]))
+        yield from _of_event(entry)
     elif isinstance(entry, Happening) and entry.severity != "debug":
-        yield "EVENTS", (_stamp(entry.ticks), entry.severity, plain(entry.who), plain(entry.kind), plain(entry.text))
+        yield from _of_event(entry)
     elif isinstance(entry, EpochSolution):
         yield from _of_solution(entry)
+        yield from pose_rows(entry)
+
+
+def _of_event(entry: Happening) -> Iterable[tuple[str, Row]]:
+    words = (entry.severity, plain(entry.who), plain(entry.kind), plain(entry.text))
+    yield "EVENTS", (_stamp(entry.ticks), *words)
 
 
 def _of_solution(entry: EpochSolution) -> Iterable[tuple[str, Row]]:
     """Row of an epoch's answer; missing values are `none`."""
     answer, stamp = entry.answer, _stamp(entry.ticks)
     lists = (answer.get("names"), answer.get("used"), answer.get("rejected"))
-    counts = ["none" if values is None else _number(len(values)) for values in lists]
-    statistics = [_number(answer.get(key)) for key in COLUMNS["EPOCHS"][4:7]]
-    posture = [_number(answer.get(key)) for key in ("azimuth", "elevation")]
+    counts = ["none" if values is None else number_word(len(values)) for values in lists]
+    statistics = [number_word(answer.get(key)) for key in COLUMNS["EPOCHS"][4:7]]
+    posture = [number_word(answer.get(key)) for key in ("azimuth", "elevation")]
     verdict = verdict_of(entry).word
-    yield "EPOCHS", (stamp, _number(answer.get("number")), *counts, *statistics, *posture, verdict)
+    yield "EPOCHS", (stamp, number_word(answer.get("number")), *counts, *statistics, *posture, verdict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,8 +124,8 @@ class EpochPoint:
     def row(self) -> Row:
         """Values of the sampler POINTS."""
         epoch, k = self.points, self.at
-        values = (_number(v) for v in epoch.values[k].tolist())
-        return epoch.stamp, epoch.number, plain(epoch.names[k]), *values, _number(epoch.used[k])
+        values = (number_word(v) for v in epoch.values[k].tolist())
+        return epoch.stamp, epoch.number, plain(epoch.names[k]), *values, number_word(epoch.used[k])
 
 
 def points_of(entry: EpochSolution) -> Iterable[EpochPoint]:
@@ -134,7 +140,7 @@ def points_of(entry: EpochSolution) -> Iterable[EpochPoint]:
     values[:, 3:] = triangles_of(entry.covariance, count)
     counts: Sequence[int | None] = entry.answer.get("shots") or ()
     used = (*counts[:count], *([None] * (count - len(counts))))
-    points = EpochPoints(_stamp(entry.ticks), _number(entry.answer.get("number")), names[:count], values, used)
+    points = EpochPoints(_stamp(entry.ticks), number_word(entry.answer.get("number")), names[:count], values, used)
     yield from (EpochPoint(points, k) for k in range(count))
 
 
@@ -157,12 +163,6 @@ def plain(text: str) -> str:
     """
     text = text.replace(",", ";").replace("°C", "degC").replace("°", " deg")
     return "".join(c if " " <= c <= "~" else "?" for c in text)[:300].strip(" ")
-
-
-def _number(value: object) -> str:
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != value or abs(value) == float("inf"):
-        return "none"
-    return repr(value)
 
 
 def _stamp(ticks: int) -> str:

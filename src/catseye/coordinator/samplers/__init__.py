@@ -1,0 +1,1 @@
+"""Samplers: rings of time-tagged values of ranges, points, pose, beam, surface, health, corrections."""
