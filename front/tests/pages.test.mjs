@@ -7,7 +7,9 @@ import { comparisonTable, ranked, usualScale } from "../src/pages/figures/compar
 import { dishMap } from "../src/pages/figures/dish.ts";
 import { displacements, networkScene, networkTable, worst } from "../src/pages/figures/network.ts";
 import { changes, ellipsoid, lastRow, neighbours } from "../src/pages/figures/point.ts";
+import { beside, groups, limits, prose, waiting, withUnit } from "../src/pages/figures/parameters.ts";
 import { filtered, residualTable, spread } from "../src/pages/figures/residuals.ts";
+import { ARCSECONDS, beamChart, correction, healthTable, last, moveRows, poses, scaled } from "../src/pages/figures/samplers.ts";
 import { deviations, fitRows, samplesChart, spectrumChart, stepText } from "../src/pages/figures/shot.ts";
 import { appended, droppedTable, marks, panels, seriesTable } from "../src/pages/figures/strips.ts";
 import { aligned, indexAt } from "../src/parts/strip.ts";
@@ -168,4 +170,67 @@ test("air: a path's delay, the adjustment's word on stations, and the aperture o
   assert.deepEqual(meanPath(a), { mean: 250, spread: null });
   const map = dishMap({ points: { name: [], x: [], y: [], deviation: [], u: [] }, actuators: null, zernike: [], rms: 0, verdict: null, aperture: { x: 0, y: 54, radius: 50 } }, "deviation");
   map.outline[0].x.forEach((x, i) => near(Math.hypot(x, map.outline[0].y[i] - 54), 50, 1e-9));
+});
+
+const parameter = (name, more = {}) => ({ name, value: "10", waiting: "none", legal: "2 to 600", choices: [], unit: "", changes: "plan", meaning: "", stage: "none", ...more });
+
+test("a refusal stands beside the parameter of the set that it names, else beside the first", () => {
+  const all = [parameter("round_s"), parameter("rate_hz"), parameter("cycles")];
+  const text = "The site refused: rate_hz = 0.05 gives no shot in round_s = 10 (expected at least 0.1)";
+  assert.equal(beside(text, all, ["round_s"]), "round_s");
+  assert.equal(beside(text, all, ["cycles"]), "rate_hz");
+  assert.equal(beside("The site is not connected", all, ["round_s"]), null);
+});
+
+test("parameters are grouped by what they change, and one of an unknown kind is not lost", () => {
+  const all = [parameter("a", { changes: "safety" }), parameter("b"), parameter("c", { changes: "colour" })];
+  assert.deepEqual(groups(all).map((g) => g.parameters[0].name), ["b", "a", "c"]);
+  assert.deepEqual(waiting([parameter("a", { stage: "started" }), parameter("b", { stage: "prepared" }), parameter("c", { stage: "set" })]).map((p) => p.name), ["b", "c"]);
+});
+
+test("limits have the unit behind their numbers", () => {
+  assert.equal(limits(parameter("if_hz", { unit: "Hz", legal: "1 to 10000; an integer" })), "1 to 10000\u00a0Hz, an integer");
+  assert.equal(limits(parameter("sun_cone_deg", { unit: "deg", legal: "0.5 to 60" })), "0.5 to 60°");
+  assert.equal(limits(parameter("boxes", { unit: "m", legal: "name x1 y1 z1; with ; between boxes; or none" })), "name x1 y1 z1, with ; between boxes, or none");
+  assert.equal(limits(parameter("corrections", { choices: ["off", "on"] })), "off, on");
+  assert.equal(withUnit("none", "mm"), "none");
+  assert.equal(prose("a; b"), "a, b");
+});
+
+test("beam offsets are seconds of arc with u, by direction", () => {
+  const s = { name: "BEAM", mjd: [1, 1 + 60 * S], columns: { epoch: [1, 2], azimuth_cos_e_rad: [0, 1e-5], elevation_rad: [null, -2e-5], azimuth_azimuth_rad2: [0, 4e-12], elevation_elevation_rad2: [null, 1e-12] } };
+  const c = beamChart(s);
+  near(c.y.values[1], 1e-5 * ARCSECONDS, 1e-9);
+  near(c.u[1], 2e-6 * ARCSECONDS, 1e-9);
+  near(c.x.values[0], -1, 1e-9, "minutes:");
+  assert.deepEqual([c.y.values[2], c.group, c.name[3]], [null, [0, 0, 1, 1], "elevation, epoch 2"]);
+});
+
+test("the last pose of each body: mm and seconds of arc", () => {
+  const zero = Object.fromEntries(["y_m", "z_m", "ry_rad", "rz_rad"].map((key) => [key, [0, 0, 0]]));
+  const s = { name: "POSE", mjd: [1, 1, 2], columns: { ...zero, epoch: [2, 2, 3], reference: [1, 1, 1], body: ["dish", "arm", "dish"], x_m: [9, 3e-3, 1e-3], x_x_m2: [1, 1, 4e-8], rx_rad: [0, 0, 1e-6], rx_rx_rad2: [0, 0, 1e-14] } };
+  const [dish, arm] = poses(s);
+  assert.deepEqual([dish.body, dish.epoch, arm.motions[0].value, dish.motions[0].value, dish.motions[0].unit], ["dish", 3, 3, 1, "mm"]);
+  assert.deepEqual(poses({ ...s, columns: { ...s.columns, reference: [1, 1, 3] } })[0].motions.map((m) => m.value), [0, 0, 0, 0, 0, 0]);
+  near(dish.motions[0].u, 0.2, 1e-12);
+  near(dish.motions[3].value, 1e-6 * ARCSECONDS, 1e-12);
+  assert.deepEqual([dish.motions[3].unit, dish.motions[1].u], ["″", null]);
+});
+
+test("corrections of the reference epoch are zero, and unknown ones say so", () => {
+  const row = { epoch: 3, reference: 2, focus_m: -1e-3, u_focus_m: 2e-4, elevation_rad: null, u_elevation_rad: null };
+  assert.equal(correction(row, "focus_m", 1e3, "mm"), "\u22121.00 ± 0.20\u00a0mm");
+  assert.equal(correction(row, "elevation_rad", 1, "″"), "unknown");
+  assert.equal(correction({ ...row, epoch: 2 }, "focus_m", 1e3, "mm"), "0: this epoch is the zero");
+  assert.equal(correction({ ...row, epoch: 2 }, "elevation_rad", 1, "″"), "unknown");
+});
+
+test("health is the last report of each ranger, in their order", () => {
+  const s = { name: "HEALTH", mjd: [1, 2, 3], columns: { ranger: ["ZY110", "ZY102", "ZY110"], state: ["ready", "ready", "hold"], clock_offset_s: [0.1, null, 2e-3] } };
+  const t = healthTable(s);
+  assert.deepEqual([column(t, "ranger"), column(t, "state"), column(t, "clock_offset")], [["ZY102", "ZY110"], ["ready", "hold"], [null, 2]]);
+  assert.deepEqual(moveRows({ name: "MOVES", mjd: [1, 2], columns: { actuator: ["a", "b"], value: [1, 2], unit: ["mm", "mm"], by: ["anna", "bert"], reference: [1, 1] } }).map((r) => r.actuator), ["b", "a"]);
+  const row = last(s);
+  assert.deepEqual([row.state, scaled(row, "clock_offset_s", 1e3), scaled(row, "state", 1)], ["hold", 2, null]);
+  assert.equal(last({ name: "HEALTH", mjd: [], columns: {} }), null);
 });

@@ -75,7 +75,7 @@ def test_formulas_are_drawn_by_the_copy_in_the_site(opened, width):
 
 
 def test_search_finds_a_formula_by_its_name(opened):
-    watch = opened("search.html?q=saturation_pressure_hpa")
+    watch = opened("search.html?q=ice_saturation")
     first = watch.page.locator("#search-results li a").first
     first.wait_for(timeout=30_000)
     first.click()

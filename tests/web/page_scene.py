@@ -261,6 +261,21 @@ class MadeUpWatch:
         self.done.append((name, tuple(parameters), who))
         return {"command": name, "values": list(parameters), "at": MJD, "lease_from": None}
 
+    async def parameters(self):
+        texts = {"value": "10", "waiting": "none", "legal": "2 to 600", "unit": "s"}
+        words = {"changes": "plan", "meaning": "length of a round", "stage": "none", "choices": []}
+        row = {"name": "round_s", **texts, **words}
+        lock = {"parameters": ["rate_hz", "round_s"], "rule": "a round has a shot of each ranger", "refusal": None}
+        return {"parameters": [row], "interlocks": [lock]}
+
+    async def samplers(self):
+        return {"samplers": [{"name": "FOCUS", "values": 1, "columns": ["epoch", "along_axis_m", "verdict"]}]}
+
+    async def sampler(self, name, limit=1):
+        if name.upper() != "FOCUS":
+            raise InputError(f"{name!a} is not a sampler")
+        return {"name": "FOCUS", "mjd": [MJD], "columns": {"epoch": [3.0], "along_axis_m": [None], "verdict": ["good"]}}
+
     async def console(self, ranger, line, who):
         self.done.append((ranger, line, who))
         return {"replies": [f"OK {line}"]}

@@ -30,6 +30,9 @@ ANSWERS = {
     "/api/comparison?first=3&second=3": "ComparisonJson",
     "/api/surface": "SurfaceJson",
     "/api/events?severity=warning": "EventsJson",
+    "/api/parameters": "ParametersJson",
+    "/api/samplers": "SamplersJson",
+    "/api/samplers/FOCUS?limit=10": "SamplerValuesJson",
 }
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
 
@@ -58,7 +61,7 @@ def test_an_answer_has_the_shape_of_the_document(client, path):
 
 def test_each_route_of_the_document_is_tested(client):
     paths = set(client.get("/api/openapi.json").json()["paths"])
-    templates = {"3": "{number}", "41": "{number}", "A": "{name}", "ZY101": "{name}"}
+    templates = {"3": "{number}", "41": "{number}", "A": "{name}", "ZY101": "{name}", "FOCUS": "{name}"}
     tested = {"/".join(templates.get(part, part) for part in path.split("?")[0].split("/")) for path in ANSWERS}
     posts = {path for path in paths if path.startswith(("/api/commands", "/api/console", "/api/alarms"))}
     assert paths == tested | posts | {"/metrics", "/api/report"}
@@ -84,6 +87,8 @@ def test_each_route_of_the_document_is_tested(client):
         ("/api/events?severity=loud", 422, "query severity"),
         ("/api/nothing", 404, "/api/nothing is not a path"),
         ("/api/report", 404, "shows a site"),
+        ("/api/samplers/GOSSIP", 404, "'GOSSIP' is not a sampler"),
+        ("/api/samplers/FOCUS?limit=4097", 422, "query limit"),
     ],
 )
 def test_a_refusal_is_one_line(client, path, status, text):

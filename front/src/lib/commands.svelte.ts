@@ -3,8 +3,8 @@ import { ApiError, post } from "./api";
 import { settings } from "./settings.svelte";
 import { mjdNow } from "./time";
 
-export type Name = "MODE" | "DROP" | "TAKE" | "STREAM" | "SET" | "PREPARE" | "START" | "CLOCK";
-export interface Field { key: string; label: string; from: "modes" | "rangers" | "targets" | "parameters" | "text"; optional?: boolean }
+export type Name = "MODE" | "DROP" | "TAKE" | "STREAM" | "CLOCK" | "REFERENCE" | "MOVED";
+export interface Field { key: string; label: string; from: "modes" | "rangers" | "targets" | "units" | "text"; optional?: boolean }
 export interface Kind {
   name: Name; title: string; about: string; fields: Field[];
   parameters: (values: Record<string, string>) => string[];
@@ -41,15 +41,18 @@ export const kinds: Kind[] = [
     effect: (v) => v.target ? `${v.ranger || "The ranger"} measures ${v.target} again and again, and nothing else.` : `${v.ranger || "The ranger"} ends its stream and goes back to the plan.`,
   },
   {
-    name: "SET", title: "Set a parameter", about: "The value is checked and waits for PREPARE and START.", fields: [{ key: "name", label: "Parameter", from: "parameters" }, { key: "value", label: "Value", from: "text" }],
-    parameters: (v) => [v.name ?? "", v.value ?? ""],
-    effect: (v) => `The value of ${v.name || "the parameter"} is checked and waits. Nothing changes before START.`,
-  },
-  { name: "PREPARE", title: "Check waiting values", about: "All values that wait are checked together.", fields: [], parameters: () => [], effect: () => "Checks all values that wait, together. Nothing changes before START." },
-  { name: "START", title: "Activate prepared values", about: "All prepared values become active at once.", fields: [], parameters: () => [], effect: () => "All prepared values become active at once." },
-  {
     name: "CLOCK", title: "Accept the machine's clock", about: "The count of UTC takes this machine's clock over; where clocks disagreed, firing goes on.", fields: [], parameters: () => ["ACCEPT"],
     effect: () => "The coordinator's count of UTC takes the machine's clock over, and firing may go on. Do this only where that clock is known to be right.",
+  },
+  {
+    name: "REFERENCE", title: "Set the zero", about: "The last epoch becomes the zero of pose, beam offset, focus and corrections.", fields: [], parameters: () => ["NOW"],
+    effect: () => "The last epoch becomes the zero of pose, beam offset, focus and corrections, from the next epoch on. The journal has it, and a replay repeats it.",
+  },
+  {
+    name: "MOVED", title: "Record a move", about: "A move of another actuator of the telescope, such as the subreflector, is recorded beside the corrections. Nothing moves.",
+    fields: [{ key: "actuator", label: "Actuator", from: "text" }, { key: "value", label: "Value after the move", from: "text" }, { key: "unit", label: "Unit", from: "units" }],
+    parameters: (v) => [v.actuator ?? "", v.value ?? "", v.unit ?? "", v.who ?? ""],
+    effect: (v) => `Records that ${v.actuator || "the actuator"} was moved to ${v.value || "the value"} ${v.unit ?? ""}, under your name. Nothing moves.`,
   },
 ];
 
@@ -76,10 +79,14 @@ class Commands {
   }
 
   async send(kind: Kind, values: Record<string, string>): Promise<Issued> {
-    const parameters = kind.parameters(values);
+    return this.command(kind.name, kind.parameters({ ...values, who: settings.who }));
+  }
+
+  /** Command the coordinator under the name that the settings know. */
+  async command(name: string, parameters: string[]): Promise<Issued> {
     const who = settings.who;
-    return this.run([kind.name, ...parameters].join(" "), who, async () => {
-      const answer = await post<{ values: unknown; lease_from?: string | null }>("/api/commands", { command: kind.name, parameters, who });
+    return this.run([name, ...parameters].join(" "), who, async () => {
+      const answer = await post<{ values: unknown; lease_from?: string | null }>("/api/commands", { command: name, parameters, who });
       return said(answer.values) + (answer.lease_from ? `; the lease was taken from ${answer.lease_from}` : "");
     });
   }

@@ -49,3 +49,10 @@ export interface Surface {
   zernike: { n: number; m: number; name: string; value: Num; u: Num }[]; rms: Num; verdict: unknown;
 }
 export interface Events { mjd: number[]; severity: string[]; who: string[]; kind: string[]; text: string[] }
+export interface Parameter {
+  name: string; value: string; waiting: string; legal: string; choices: string[]; unit: string; changes: string; meaning: string;
+  stage: "none" | "set" | "prepared" | "started";
+}
+export interface Interlock { parameters: string[]; rule: string; refusal: string | null }
+export interface Parameters { parameters: Parameter[]; interlocks: Interlock[] }
+export interface Sampler { name: string; mjd: number[]; columns: Record<string, (Num | string)[]> }

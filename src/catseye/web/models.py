@@ -13,7 +13,7 @@ Names = list[str]
 Mjd = Annotated[float, Field(description="MJD, UTC, d")]
 Verdict = Annotated[str | None, Field(description="good, doubtful or failed")]
 Severity = Literal["debug", "note", "warning", "alarm"]
-Command = Literal["MODE", "DROP", "TAKE", "STREAM", "SET", "PREPARE", "START", "CLOCK"]
+Command = Literal["MODE", "DROP", "TAKE", "STREAM", "SET", "PREPARE", "START", "DISCARD", "CLOCK", "REFERENCE", "MOVED"]
 Who = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[ -~]*$", description="name of the person")]
 Line = Annotated[str, Field(min_length=1, max_length=900, pattern=r"^[ -~]*$")]
 Word = Annotated[str, Field(max_length=256, pattern=r"^[ -~]*$")]
@@ -599,6 +599,57 @@ class EventsJson(Shape):
     who: Names
     kind: Names
     text: Names
+
+
+class ParameterJson(Shape):
+    """Parameter of a running site, its values as texts."""
+
+    name: str
+    value: str
+    waiting: str = Field(description="value that waits for START or the next round; none: no value waits")
+    legal: str = Field(description="legal values, in words")
+    choices: Names = Field(description="legal words, of a parameter of a few; else none")
+    unit: str
+    changes: str = Field(description="coordinator, plan, shots, answers, safety or output")
+    meaning: str
+    stage: str = Field(description="of the value that waits: set, prepared, started (until the round's end); none")
+
+
+class InterlockJson(Shape):
+    """Check of parameters together, or against the site's state."""
+
+    parameters: Names
+    rule: str = Field(description="what must hold, with its limit")
+    refusal: str | None = Field(description="why the values that wait would be refused; null: they would not")
+
+
+class ParametersJson(Shape):
+    """Parameters of a running site, and their interlocks."""
+
+    parameters: list[ParameterJson]
+    interlocks: list[InterlockJson]
+
+
+class SamplerJson(Shape):
+    """Sampler: values kept, and their columns, whose names end with their unit."""
+
+    name: str
+    values: int
+    columns: Names
+
+
+class SamplersJson(Shape):
+    """Samplers of a running site."""
+
+    samplers: list[SamplerJson]
+
+
+class SamplerValuesJson(Shape):
+    """Last values of a sampler as columns, oldest first."""
+
+    name: str
+    mjd: Column
+    columns: dict[str, list[Number | str]]
 
 
 class CommandBody(Shape):

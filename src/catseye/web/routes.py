@@ -49,14 +49,14 @@ router = APIRouter(prefix="/api", responses=ERRORS)
 command_router = APIRouter(prefix="/api", tags=["commands"], responses=COMMAND_ERRORS)
 
 
-async def answer(request: Request, method: str, *arguments: Any, **named: Any) -> Response:
-    """Answer with what a method of the watch gives, in a thread: it may read a journal."""
+async def answer(request: Request, work: Callable[["SiteWatch"], Any]) -> Response:
+    """Answer with what the watch gives, in a thread: it may read a journal."""
     subject: PageSubject = request.app.state.subject
     watch = subject.site()
     since, until = (request.query_params.get(name) for name in ("since", "until"))
     if since is not None and until is not None and float(since) > float(until):
         raise ArgumentError(f"since = {since}, until = {until} (expected an earlier and a later MJD)", "since", "until")
-    return await subject.desk.answer(request, lambda: getattr(watch, method)(*arguments, **named))
+    return await subject.desk.answer(request, lambda: work(watch))
 
 
 async def done(request: Request, work: Callable[["SiteWatch"], Awaitable[Any]]) -> Response:
@@ -76,6 +76,23 @@ async def done(request: Request, work: Callable[["SiteWatch"], Awaitable[Any]]) 
         raise HTTPException(409, str(problem)) from problem
 
 
+async def asked(request: Request, work: Callable[["SiteWatch"], Awaitable[Any]]) -> Response:
+    """Answer with what the coordinator says to a question.
+
+    Raises HTTPException: 503 if the site is not connected or silent, 404 with its words if there is no such thing.
+    """
+    watch = request.app.state.subject.site()
+    if watch.state()["source"] == "live" and not watch.state()["connected"]:
+        raise HTTPException(503, "the site is not connected")
+    try:
+        async with asyncio.timeout(LONGEST_COMMAND):
+            return json_answer(await work(watch))
+    except TimeoutError:
+        raise HTTPException(503, f"no answer within {LONGEST_COMMAND:g} s") from None
+    except CatseyeError as problem:
+        raise HTTPException(404, str(problem)) from problem
+
+
 @router.get("/service", tags=["service"], summary="The service", response_model=models.ServiceJson)
 async def service(request: Request) -> Response:
     state = request.app.state
@@ -84,34 +101,34 @@ async def service(request: Request) -> Response:
 
 @router.get("/site", tags=["site"], summary="Map of the site", response_model=models.SiteJson)
 async def site(request: Request) -> Response:
-    return await answer(request, "site")
+    return await answer(request, lambda watch: watch.site())
 
 
 @router.get("/state", tags=["site"], summary="State of the site", response_model=models.StateJson)
 async def state(request: Request, at: At = None) -> Response:
-    return await answer(request, "state", at)
+    return await answer(request, lambda watch: watch.state(at))
 
 
 @router.get("/epochs", tags=["site"], summary="Epochs", response_model=models.EpochsJson)
 async def epochs(request: Request, since: Since = None, until: Until = None, limit: Limit = 200) -> Response:
-    return await answer(request, "epochs", since, until, limit)
+    return await answer(request, lambda watch: watch.epochs(since, until, limit))
 
 
 @router.get("/epochs/{number}", tags=["site"], summary="An epoch", response_model=models.EpochJson)
 async def epoch(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
-    return await answer(request, "epoch", number, run, at)
+    return await answer(request, lambda watch: watch.epoch(number, run, at))
 
 
 @router.get(
     "/epochs/{number}/residuals", tags=["site"], summary="Residuals of an epoch", response_model=models.ResidualsJson
 )
 async def residuals(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
-    return await answer(request, "residuals", number, run, at)
+    return await answer(request, lambda watch: watch.residuals(number, run, at))
 
 
 @router.get("/series/names", tags=["site"], summary="Series there are", response_model=models.SeriesNamesJson)
 async def series_names(request: Request) -> Response:
-    return await answer(request, "series_names")
+    return await answer(request, lambda watch: watch.series_names())
 
 
 @router.get("/series", tags=["site"], summary="Series over time", response_model=models.SeriesJson)
@@ -121,7 +138,7 @@ async def series(
     chosen = [name for name in (part.strip() for part in names.split(",")) if name]
     if not 1 <= len(chosen) <= MOST_NAMES:
         raise ArgumentError(f"{len(chosen)} names (expected 1 to {MOST_NAMES})", "names")
-    return await answer(request, "series", chosen, since, until, most)
+    return await answer(request, lambda watch: watch.series(chosen, since, until, most))
 
 
 @router.get("/dropped", tags=["site"], summary="Map of dropped channels", response_model=models.DroppedJson)
@@ -131,7 +148,7 @@ async def dropped(
     until: Until = None,
     bins: Annotated[int, Query(ge=1, le=1000, description="bins of time")] = 200,
 ) -> Response:
-    return await answer(request, "dropped", since, until, bins)
+    return await answer(request, lambda watch: watch.dropped(since, until, bins))
 
 
 @router.get("/shots", tags=["site"], summary="Shots", response_model=models.ShotsJson)
@@ -145,38 +162,42 @@ async def shots(
     until: Until = None,
     limit: Limit = 500,
 ) -> Response:
-    named = {"ranger": ranger, "target": target, "epoch": epoch, "status": status}
-    return await answer(request, "shots", **named, since=since, until=until, limit=limit)
+    return await answer(
+        request,
+        lambda watch: watch.shots(
+            ranger=ranger, target=target, epoch=epoch, status=status, since=since, until=until, limit=limit
+        ),
+    )
 
 
 @router.get("/shots/{number}", tags=["site"], summary="A shot", response_model=models.ShotJson)
 async def shot(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
-    return await answer(request, "shot", number, run, at)
+    return await answer(request, lambda watch: watch.shot(number, run, at))
 
 
 @router.get("/shots/{number}/samples", tags=["site"], summary="Samples of a shot", response_model=models.SamplesJson)
 async def samples(request: Request, number: Number, run: Integer = None, at: At = None) -> Response:
-    return await answer(request, "samples", number, run, at)
+    return await answer(request, lambda watch: watch.samples(number, run, at))
 
 
 @router.get("/points/{name}", tags=["site"], summary="A point", response_model=models.PointJson)
 async def point(request: Request, name: Name, since: Since = None, until: Until = None) -> Response:
-    return await answer(request, "point", name, since, until)
+    return await answer(request, lambda watch: watch.point(name, since, until))
 
 
 @router.get("/rangers/{name}", tags=["site"], summary="A ranger", response_model=models.RangerJson)
 async def ranger(request: Request, name: Name, at: At = None) -> Response:
-    return await answer(request, "ranger", name, at)
+    return await answer(request, lambda watch: watch.ranger(name, at))
 
 
 @router.get("/calibrations", tags=["site"], summary="Calibrations", response_model=models.CalibrationsJson)
 async def calibrations(request: Request, at: At = None) -> Response:
-    return await answer(request, "calibrations", at)
+    return await answer(request, lambda watch: watch.calibrations(at))
 
 
 @router.get("/air", tags=["site"], summary="Air along each path", response_model=models.AirJson)
 async def air(request: Request, epoch: Integer = None, run: Integer = None, at: At = None) -> Response:
-    return await answer(request, "air", epoch, run, at)
+    return await answer(request, lambda watch: watch.air(epoch, run, at))
 
 
 @router.get("/comparison", tags=["site"], summary="Two epochs compared", response_model=models.ComparisonJson)
@@ -187,12 +208,12 @@ async def comparison(
     run: Integer = None,
     at: At = None,
 ) -> Response:
-    return await answer(request, "comparison", first, second, run, at)
+    return await answer(request, lambda watch: watch.comparison(first, second, run, at))
 
 
 @router.get("/surface", tags=["site"], summary="Surface of an epoch", response_model=models.SurfaceJson)
 async def surface(request: Request, epoch: Integer = None, run: Integer = None, at: At = None) -> Response:
-    return await answer(request, "surface", epoch, run, at)
+    return await answer(request, lambda watch: watch.surface(epoch, run, at))
 
 
 @router.get("/events", tags=["site"], summary="Events", response_model=models.EventsJson)
@@ -203,7 +224,28 @@ async def events(
     severity: Annotated[models.Severity | None, Query(description="the least")] = None,
     limit: Limit = 500,
 ) -> Response:
-    return await answer(request, "events", since, until, severity, limit)
+    return await answer(request, lambda watch: watch.events(since, until, severity, limit))
+
+
+@router.get("/parameters", tags=["control"], summary="Parameters", response_model=models.ParametersJson)
+async def parameters(request: Request) -> Response:
+    return await asked(request, lambda watch: watch.parameters())
+
+
+@router.get("/samplers", tags=["control"], summary="Samplers", response_model=models.SamplersJson)
+async def samplers(request: Request) -> Response:
+    return await asked(request, lambda watch: watch.samplers())
+
+
+@router.get(
+    "/samplers/{name}", tags=["control"], summary="Values of a sampler", response_model=models.SamplerValuesJson
+)
+async def sampler(
+    request: Request,
+    name: Name,
+    limit: Annotated[int, Query(ge=1, le=4096, description="so many of the latest")] = 100,
+) -> Response:
+    return await asked(request, lambda watch: watch.sampler(name, limit))
 
 
 @router.get("/report", tags=["result"], summary="Report of a result", response_model=models.ReportJson)
