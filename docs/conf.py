@@ -24,6 +24,7 @@ extensions = [
     "myst_nb",
     "python_reference",
     "references",
+    "section_table",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx_copybutton",

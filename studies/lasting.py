@@ -34,14 +34,15 @@ from typing import Any
 
 import numpy as np
 
-from catseye.cli.live.options import site_of
+import catseye
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, STYLE, Figure, mpl, svg
 from catseye.geometry.sky.time_tag import PER_DAY
 from catseye.service.coordinator import LiveCoordinator, Orders
+from catseye.service.listening import start_line_of
 from catseye.service.rangers import ListenAddresses, Listening, RangersServed
 from catseye.service.running import FastLoop
-from catseye.service.screen import SilentView
-from catseye.service.simulation import Simulation, listening_of, peers_of
+from catseye.service.simulation import Simulation, peers_of
+from catseye.service.views import SilentView
 from catseye.service.warm import WarmingClock
 from catseye.service.world import MOTION, TwinWords, twin_heads
 
@@ -71,7 +72,7 @@ def remember(path: Path, minutes: float) -> None:
 
     async def both(journal: str) -> None:
         orders = Orders(journal=journal, port=0)
-        simulation = Simulation(site_of("gbt"), "gbt", TwinWords(NIGHT), orders, minutes, SilentView())
+        simulation = Simulation(catseye.load("gbt"), "gbt", TwinWords(NIGHT), orders, minutes, SilentView())
         watching = asyncio.ensure_future(watch())
         try:
             await simulation.run_fast()
@@ -133,7 +134,7 @@ class HastyLoop(asyncio.SelectorEventLoop):
 
 def twin_process(began: int, rate: float, motion: str) -> None:
     """Serve a twin on free ports until standard input ends; say where in one JSON line."""
-    site, world = site_of("gbt"), TwinWords(NIGHT, motion=motion)
+    site, world = catseye.load("gbt"), TwinWords(NIGHT, motion=motion)
     truth, clock = world.twin(site), FastClock(began, rate)
     warming = WarmingClock(clock)
     heads = twin_heads(truth, site.rangers, warming)
@@ -171,10 +172,11 @@ def remember_processes(path: Path, minutes: float, rate: float, motion: str) -> 
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as twin:
         assert twin.stdin is not None
         assert twin.stdout is not None
-        at = listening_of(twin.stdout.readline())
+        at = start_line_of(twin.stdout.readline()).at
+        assert at is not None
         with tempfile.TemporaryDirectory() as folder, asyncio.Runner(loop_factory=lambda: HastyLoop(rate)) as runner:
             orders = Orders(journal=str(Path(folder) / "night.db"), port=0)
-            site = site_of("gbt")
+            site = catseye.load("gbt")
             running = LiveCoordinator(site, orders, peers_of(at), clock=FastClock(began, rate))
             rows = runner.run(_watched(running, twin.pid, minutes, path))
         twin.stdin.close()

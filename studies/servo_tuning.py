@@ -14,6 +14,8 @@ from catseye.constants import DEGREE
 from catseye.errors import ValidityError
 from catseye.gateways.steering.servo_figures import move_figure, step_figure
 from catseye.ranger.motion_units import acceleration_integer, velocity_integer
+from catseye.records.laboratory.move_table import RecordedMove
+from catseye.reduction.steering.servo_identification import ServoFit, identify_axis
 from catseye.simulator.servo.axis import TRACKING_SAMPLES, AxisTrace, ServoAxis, Settling
 from catseye.simulator.servo.motion_chip import MotionChip
 from catseye.simulator.servo.motor import AxisDesign
@@ -21,7 +23,6 @@ from catseye.simulator.servo.tuning import (
     Filter,
     closed_loop,
     design_filter,
-    identify,
     margins,
     plant_of,
     ready_axis,
@@ -200,6 +201,12 @@ def draw(directory: Path, chosen: Filter) -> None:
     (directory / "servo-step.svg").write_text(step_figure(responses, target=STEP, linear=linear), encoding="utf-8")
 
 
+def identified(chosen: Filter) -> ServoFit:
+    """Axis identified from a move each way."""
+    traces = {name: move(axis(chosen), target) for name, target in (("there", MOVE), ("back", -MOVE))}
+    return identify_axis([RecordedMove(name, t.time, t.output, t.actual) for name, t in traces.items()])
+
+
 def unit_step(above: np.ndarray, below: np.ndarray, samples: int) -> np.ndarray:
     """Response of a discrete transfer function to a unit step."""
     from scipy.signal import lfilter
@@ -212,10 +219,10 @@ def main(directory: str) -> None:
     """Print the numbers, write the figures."""
     plant = plant_of(AXIS)
     chosen = design_filter(plant, crossover_hz=CHOSEN[0], interval=CHOSEN[1])
-    found = identify(move(axis(chosen)), move(axis(chosen), -MOVE))
+    gain, decay, friction, _ = identified(chosen).values
     parts = [
         f"axis: gain {plant.gain:.0f} counts/s2, decay {plant.decay:.2f} 1/s, friction {plant.friction:.2f} steps",
-        f"identified: {found.gain:.0f}, {found.decay:.2f}, {found.friction:.2f}",
+        f"identified: {gain:.0f}, {decay:.2f}, {friction:.2f}",
         table(), waits(chosen), frictions(), offsets(), overflow(chosen), tracking(chosen), homing(chosen),
     ]  # fmt: skip
     sys.stdout.write("\n\n".join(parts) + "\n")

@@ -9,7 +9,7 @@
 
 The argument is a Python call of one result of catseye. Each line names a figure of `catseye.show` and says what it
 shows. `:as: night` keeps the result for later calls. `:command:` is the same on the command line. Simulated inputs
-that no bundled example has are `years`, `dishes`, `vibrating`, `epochs`, `moved`, `bending`,
+that no bundled example has are `years`, `dishes`, `vibrating`, `epochs`, `moved`, `bending`, `bent`,
 `first_night` and `todays_site`; see `GalleryCalls`.
 """
 
@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```\{gallery\} (?P<call>.+)\n(?P<body>(?:.*\n)*?)```$", re.MULTILINE)
 OPTION = re.compile(r"^:(?P<name>[a-z]+): (?P<value>.+)$")
 NIGHTS, POINTS = 45, 9  # of the simulated archive
-SCENES = ("years", "dishes", "vibrating", "epochs", "moved", "bending", "first_night", "todays_site")
+SCENES = ("years", "dishes", "vibrating", "epochs", "moved", "bending", "bent", "first_night", "todays_site")
 
 
 @dataclass(frozen=True)
@@ -138,6 +138,15 @@ class GalleryCalls:
         ]
         catseye.archive(place / "dishes", nights, processes=1)
         return place / "dishes"
+
+    @cached_property
+    def bent(self) -> Path:
+        """Night at a low elevation of a telescope that bends as the bundled structural model."""
+        import catseye
+
+        model = catseye.examples("structural-model/telescope.toml")
+        options = {"elevation_deg": 15.0, "dish_prisms": 12, "interval_s": 14.0, "again": 0.0}
+        return Path(catseye.night(Path(self._place.name) / "bent", structure=model, **options))
 
     @cached_property
     def first_night(self) -> str:

@@ -11,7 +11,7 @@ import pytest
 from catseye.errors import InputError
 from catseye.gateways.examples import copy_example
 from catseye.records.files import examples
-from catseye.records.files.examples import bundled_site, example_campaign, located
+from catseye.records.files.examples import example_campaign, located
 from catseye.records.site.folder import read_site, site_files
 from catseye.reduction.site.places import places_of
 from repository import ROOT
@@ -24,7 +24,7 @@ ROUNDING_MM = 0.001  # of each coordinate as written
 
 @pytest.fixture(scope="module")
 def gbt():
-    return read_site(bundled_site("gbt"))
+    return read_site(examples.example("gbt"))
 
 
 @pytest.fixture(scope="module")
@@ -47,15 +47,13 @@ def points(dish):
 
 def test_examples_are_found_by_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert bundled_site("gbt") == located("gbt") == SITES / "gbt"
+    assert examples.example("gbt") == located("gbt") == SITES / "gbt"
     assert example_campaign() == located("night-01") == SITES.parent / "night-01"
     assert located("./gbt") == SITES / "gbt"  # a path is what it means: here is no such folder
     assert located("elsewhere/gbt") == Path("elsewhere/gbt")
     assert located("networks/feed-arm.toml") == located("examples/networks/feed-arm.toml")
     assert located("networks/feed-arm.toml").is_file()
-    with pytest.raises(InputError, match=r"^site = 'vla' is not bundled \(expected gbt\)$"):
-        bundled_site("vla")
-    for name in ("", "..", "../sites", "/etc", "nothing"):
+    for name in ("", "..", "../sites", "/etc", "vla"):
         with pytest.raises(InputError, match=r"^example .* not found"):
             examples.example(name)
 
@@ -102,10 +100,10 @@ def test_examples_that_were_not_installed_are_refused_in_one_line(monkeypatch, t
     package = tmp_path / "lib" / "catseye"
     monkeypatch.setattr(examples, "__file__", str(package / "records" / "files" / "examples.py"))
     with pytest.raises(InputError, match=r"^the examples are missing: neither [^\n]+ nor [^\n]+$"):
-        bundled_site("gbt")
+        examples.example("gbt")
     (package / "examples" / "night-01").mkdir(parents=True)
     (package / "examples" / "sites" / "gbt").mkdir(parents=True)
-    assert bundled_site("gbt") == package / "examples" / "sites" / "gbt"
+    assert examples.example("gbt") == package / "examples" / "sites" / "gbt"
 
 
 def test_the_site_holds_all_rangers_triplets_and_prisms(gbt, dish):

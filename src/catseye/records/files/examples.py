@@ -6,7 +6,6 @@ from catseye.errors import InputError
 from catseye.records.files.refusal import shown
 
 SHORT = {"night-01": "night-01", "gbt": "sites/gbt"}  # short names
-SITE_NAMES = ("gbt",)
 MARK = {"night-01": "site.toml", "gbt": "site.toml"}  # file by which a local folder of that name counts as a site
 SKIPPED = {"__pycache__"}
 
@@ -23,7 +22,9 @@ def examples_directory() -> Path:
 def example_names() -> tuple[str, ...]:
     """Names of all examples, sorted; a site or a network folder counts as one."""
     root = examples_directory()
-    folders = [path.parent for path in root.rglob("site.toml")] + [path.parent for path in root.rglob("points.csv")]
+    folders = [path.parent for path in root.rglob("site.toml")] + [
+        path.parent for path in root.rglob("points.csv") if (path.parent / "ranges.csv").exists()
+    ]
     files = [
         path
         for path in root.rglob("*")
@@ -56,16 +57,6 @@ def name_of(path: Path) -> str:
 def example_campaign() -> Path:
     """Path of the bundled campaign."""
     return example("night-01")
-
-
-def bundled_site(name: str) -> Path:
-    """Path of a bundled site; InputError for an unknown name or missing files.
-
-    name   one of SITE_NAMES
-    """
-    if name not in SITE_NAMES:
-        raise InputError(f"site = {shown(name)} is not bundled (expected {', '.join(SITE_NAMES)})")
-    return example(name)
 
 
 def located(path: Path | str, *, output: bool = False) -> Path:
