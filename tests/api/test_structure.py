@@ -83,7 +83,8 @@ def test_columns_of_a_model_are_in_their_units(found):
 def test_folders_one_by_one_give_the_model_of_the_folder_that_holds_them(found, nights, tmp_path):
     again = catseye.structure(*sorted(nights.iterdir()), points=["ZEG*"], pivot=FOOT, predict_deg=30.0)
     np.testing.assert_array_equal(again.coefficients, found.coefficients)
-    np.testing.assert_array_equal(again.predicted[0], found.predicted[0])
+    # Products of one posture and of two round differently.
+    np.testing.assert_allclose(again.predicted[0], found.predicted[0], rtol=0.0, atol=1e-12)
     where = catseye.save(again, tmp_path / "out")
     assert {"structure.json", "samplers.fits", "prediction.csv"} <= {path.name for path in where.iterdir()}
     assert len(again.inputs()) == 20
