@@ -429,13 +429,15 @@ class _Nodes:
 
 
 def _unit_of(reading_c: float, offset_c: float) -> str:
-    """Unit of a reading that is too warm by as much as degrees Fahrenheit are.
+    """Unit of a reading that is too warm by about as much as degrees Fahrenheit are.
 
-    >>> _unit_of(13.8, 23.8), _unit_of(13.8, 10.0)
-    (': looks like degrees Fahrenheit', '')
+    The ranges know so large an offset to a fifth, as the adjustment stops where the index formula ends.
+
+    >>> _unit_of(13.8, 23.8), _unit_of(44.0, 32.5), _unit_of(13.8, 10.0)
+    (': looks like degrees Fahrenheit', ': looks like degrees Fahrenheit', '')
     """
-    fahrenheit = abs(offset_c - (reading_c - (reading_c - 32.0) / 1.8)) < MUCH_C
-    return ": looks like degrees Fahrenheit" if fahrenheit else ""
+    excess = reading_c - (reading_c - 32.0) / 1.8
+    return ": looks like degrees Fahrenheit" if abs(offset_c - excess) < max(MUCH_C, 0.2 * excess) else ""
 
 
 @dataclass(frozen=True, eq=False)
