@@ -26,6 +26,7 @@ from catseye.reduction.epoch.settings import ReductionSettings
 DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradient
 CACHED_STATES = 64  # sets of times with cached states: one per ranger, and more
 MUCH_C = 2.0  # °C, smallest reported offset of a thermometer
+RARE_C = 42.0  # °C: air of desert afternoons; above it a unit is asked for where the weather is impossible
 LEAST_HPA = 600.0
 NODES = 5  # of the quadrature along a path: 1e-12 for straight profiles over 200 m
 FAIR_SHARE = 0.3  # of a station's temperature in a path's, of two stations, from which the path determines it
@@ -312,7 +313,7 @@ class AirField:
         apart = np.ptp(state[..., 0] - offsets, axis=1) + 100.0 * np.any(state[..., 1] < LEAST_HPA, axis=1)
         k = int(np.argmax(apart))
         readings = "; ".join(
-            f"{name} {t:.1f} °C, {p:.1f} hPa, {h:.0f} %"
+            f"{name} {t:.1f} °C{_hot(t)}, {p:.1f} hPa, {h:.0f} %"
             + (f", by the ranges {offset:+.1f} °C too warm{_unit_of(t, offset)}" if abs(offset) > MUCH_C else "")
             for name, (t, p, h), offset in zip(self.stations, state[k], offsets, strict=True)
         )
@@ -426,6 +427,15 @@ class _Nodes:
         return _Nodes(
             z=z, east=east, north=north, zeta=zeta, share=share, profile=profile, weight=nodes_along(0.0, 1.0, NODES)[1]
         )
+
+
+def _hot(reading_c: float) -> str:
+    """Reading that few sites ever have, as degrees Fahrenheit.
+
+    >>> _hot(50.0), _hot(30.0)
+    (' (10.0 °C if these are degrees Fahrenheit)', '')
+    """
+    return f" ({(reading_c - 32.0) / 1.8:.1f} °C if these are degrees Fahrenheit)" if reading_c > RARE_C else ""
 
 
 def _unit_of(reading_c: float, offset_c: float) -> str:
