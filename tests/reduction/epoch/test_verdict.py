@@ -10,7 +10,7 @@ from catseye.reduction.epoch.contradictions.contradiction import ClassScatter
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.lines.independence import Independence
 from catseye.reduction.epoch.motion.scatter import worst_class
-from catseye.reduction.epoch.notes import loss_doubts
+from catseye.reduction.epoch.notes import loss_doubts, loss_notes
 
 
 def test_a_jitter_of_millimetres_typed_for_tenths_is_doubtful(night_01):
@@ -65,6 +65,20 @@ def test_lost_shots_that_strays_explain_are_no_doubt(reduced_night_01):
         assert len(said) == doubts
         assert all(f"{lost} of its {len(mine)} shots" in text for text in said)
     assert loss_doubts(replace(ranges, used=used), Independence({}, {}, (), frozenset()), {}) == []
+
+
+@pytest.mark.parametrize(("w", "said"), [(10.0, "more likely its survey"), (1.0, "nothing decides which is wrong")])
+def test_a_ranger_is_not_blamed_for_shots_that_nothing_decides(reduced_night_01, w, said):
+    coordinates = reduced_night_01.coordinates
+    mine = np.array(coordinates.ranges.ranger) == "ZY105"
+    ranges = replace(
+        coordinates.ranges,
+        used=coordinates.ranges.used & ~mine,
+        standardised=np.where(mine, w, coordinates.ranges.standardised),
+    )
+    (note,) = (n for n in loss_notes(ranges, Independence({}, {}, (), frozenset()), 3.5) if n.startswith("ZY105: "))
+    assert f"{mine.sum()} of its {mine.sum()} shots" in note
+    assert said in note
 
 
 def test_a_triplet_typed_half_a_metre_off_is_named_as_one(night_01):

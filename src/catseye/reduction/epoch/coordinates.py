@@ -294,7 +294,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
         notes=(
             *record_notes(network, solution, wrong, count),
             *sound_notes(network, solution, ranges, sound),
-            *loss_notes(ranges, independence),
+            *loss_notes(ranges, independence, network.settings.critical),
             *resolved.notes,
             *cycle_notes(ranges),
         ),

@@ -1,5 +1,6 @@
 """Notes of an adjustment on records and shots, one line each."""
 
+from collections import Counter
 from collections.abc import Collection, Mapping
 
 import numpy as np
@@ -52,8 +53,11 @@ def _summarized(notes: Mapping[str, str], what: str) -> list[str]:
     return [f"{len(notes)} {what}: {', '.join(list(notes)[:MANY])} ..."]
 
 
-def loss_notes(ranges: RangeShots, independence: Independence) -> list[str]:
-    """Targets without used or checked shots; rangers that lost most shots."""
+def loss_notes(ranges: RangeShots, independence: Independence, critical: float) -> list[str]:
+    """Targets without used or checked shots; rangers that lost most shots.
+
+    critical   |w| above which a shot does not fit; others were left out because nothing decides between them
+    """
     unmeasured, unchecked = {}, {}
     for name, mine in _by_target(ranges):
         used = ranges.used[mine]
@@ -81,9 +85,13 @@ def loss_notes(ranges: RangeShots, independence: Independence) -> list[str]:
             "exceed their uncertainties; range them again",
         ),
     ]
+    misfits = Counter(n for n, w in zip(ranges.ranger, ranges.standardised, strict=True) if abs(w) > critical)
     notes += [
         f"{name}: {rejected} of its {fired} shots do not fit: more likely its survey, mirror sheet or samples than a "
         "stray reflection"
+        if 2 * misfits[name] > fired
+        else f"{name}: {rejected} of its {fired} shots are left out, most as two contradict each other and nothing "
+        "decides which is wrong: range its targets again"
         for name, (rejected, fired) in ranges.ill_fitting.items()
     ]
     return notes
