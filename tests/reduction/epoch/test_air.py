@@ -8,6 +8,7 @@ import pytest
 from catseye.atmosphere.index.air import MODELS, group_refractivity
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
+from catseye.errors import InputError
 from catseye.records.night.path_temperature import PathTemperature, path_temperature_columns
 from catseye.records.night.weather import Weather
 from catseye.reduction.epoch.air.field import AirField
@@ -51,6 +52,17 @@ def test_a_line_in_time_is_left_a_line_right_up_to_its_ends(night_01):
     expected = np.array([[10 - s / 1800, 11 - s / 1800] for s in times])
     # 1e-6 °C: the Modified Julian Day resolves a microsecond
     np.testing.assert_allclose(smooth[:, :, 0], expected, atol=1e-6)
+
+
+def test_ordinary_readings_are_not_blamed_for_air_that_the_ranges_ask_for(night_01):
+    """A profile that bends by 60 °C beside stations alike, and readings that are 60 °C apart."""
+    times = np.array([0.0, 3600.0])
+    for readings, bend, said in (((20.0, 21.0), 60.0, "ordinary air"), ((-20.0, 40.0), 0.0, "check these readings")):
+        campaign, start = weathered(night_01, [0.0, 40.0], times, lambda _, i, read=readings: read[i])
+        field = AirField.of(campaign, ReductionSettings())
+        low, high = np.array([[0.0, 0.0, -40.0]]), np.array([[100.0, 0.0, 120.0]])
+        with pytest.raises(InputError, match=said):
+            field.along(at(start, 1800.0), low, high, np.array([0.0, 0.0, bend]))
 
 
 @pytest.mark.parametrize("wander", [0.0, 0.3])

@@ -27,6 +27,7 @@ DISTINCT_HEIGHTS = 5.0  # m, stations closer in height than this show no gradien
 CACHED_STATES = 64  # sets of times with cached states: one per ranger, and more
 MUCH_C = 2.0  # °C, smallest reported offset of a thermometer
 RARE_C = 42.0  # °C: air of desert afternoons; above it a unit is asked for where the weather is impossible
+ALIKE_C = 12.0  # °C between the stations of a site
 LEAST_HPA = 600.0
 NODES = 5  # of the quadrature along a path: 1e-12 for straight profiles over 200 m
 FAIR_SHARE = 0.3  # of a station's temperature in a path's, of two stations, from which the path determines it
@@ -317,9 +318,14 @@ class AirField:
             + (f", by the ranges {offset:+.1f} °C too warm{_unit_of(t, offset)}" if abs(offset) > MUCH_C else "")
             for name, (t, p, h), offset in zip(self.stations, state[k], offsets, strict=True)
         )
-        return (
-            f"weather.csv: at {mjd_utc[k]:.5f} the stations read {readings}: along the paths these exceed the limits "
-            "of the index formula (check these readings, or leave a station out of site.toml and weather.csv)"
+        temperature, pressure = state[k, :, 0], state[k, :, 1]
+        ordinary = np.ptp(temperature) < ALIKE_C and temperature.max() < RARE_C and pressure.min() > LEAST_HPA
+        return f"weather.csv: at {mjd_utc[k]:.5f} the stations read {readings}: " + (
+            "ordinary air, but the ranges ask for air along a path beyond the limits of the index formula "
+            "(another record is wrong by many times its u, or many shots are: check surveys, typed positions, mirrors)"
+            if ordinary and np.all(np.abs(offsets) < MUCH_C)
+            else "along the paths these exceed the limits of the index formula (check these readings, or leave a "
+            "station out of site.toml and weather.csv)"
         )
 
     def _by_thermometers(self, state: "_Weather", nodes: "_Nodes") -> tuple[np.ndarray, ...]:
