@@ -57,3 +57,25 @@ def test_a_path_that_drifts_within_a_set_is_not_called_light_unnoticed():
     assert sum(not each.passed for each in still) <= 2  # 0.3 expected
     drifting = [calibrated(rng, 0.0, drift=6.3e-5).decisions[1] for _ in range(50)]
     assert not any(each.passed for each in drifting)
+
+
+def sheet(phase, level, sets):
+    columns = {"phase_target_rad": np.asarray(phase), "amplitude_target_volt": np.asarray(level)}
+    return calibrate_feedback(readings(FeedbackSheet, KIND, numbers=columns, words={"set": sets}, u_phasor_volt=3e-4))
+
+
+def test_sets_read_in_turns_are_compared_within_each_set():
+    rng = np.random.default_rng(7)
+    fringe = 1e-3 * np.sqrt(2.0) * np.cos(2 * np.pi * rng.uniform(size=60))
+    found = sheet(fringe + np.tile([0.0, 2.0], 30), np.full(60, 5.0), ["near", "far"] * 30)
+    by_set = sheet(np.append(fringe[::2], fringe[1::2] + 2.0), np.full(60, 5.0), ["near"] * 30 + ["far"] * 30)
+    assert found.decisions[1].passed
+    assert found.decisions[1].statistic == pytest.approx(by_set.decisions[1].statistic, rel=1e-9)
+
+
+def test_weak_readings_that_hide_the_excess_of_strong_ones_are_refused():
+    """30 strong readings scatter by three times their noise, 30 of a hundredth of the amplitude by half of theirs."""
+    rng = np.random.default_rng(8)
+    phase = 3.0 + np.append(rng.normal(0.0, 3 * 6e-5, 30), rng.normal(0.0, 0.5 * 6e-3, 30))
+    with pytest.raises(EstimationError, match=r"weak ones' noise, up to 6 mrad, hides"):
+        sheet(phase, np.repeat([5.0, 0.05], 30), ["near"] * 30 + ["far"] * 30)

@@ -6,7 +6,6 @@ by some micrometres, or that moves by itself, hold it beside the noise of the sa
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -54,7 +53,7 @@ def calibrate_feedback(readings: SheetReadings, reject: bool = False) -> Calibra
     reject     has no effect: wrong readings are left out by a reason in left_out
 
     The mean square within sets, less what the samples' noise explains; its u is that of a chi-square. Raises
-    EstimationError for fewer than 10 degrees of freedom.
+    EstimationError for fewer than 10 degrees of freedom, and where weak readings hide the excess of strong ones.
 
     Source: [PARKER04] chapter 6, item 4, names the cause; `signal.systematics.feedback` has the sizes.
     """
@@ -80,6 +79,12 @@ def calibrate_feedback(readings: SheetReadings, reject: bool = False) -> Calibra
     statistic = float(np.sum(departure[on] ** 2 / (noise[on] ** 2 + sheet.u_walk_rad**2))) / degrees
     significant = statistic > limit
     upper = float(np.sqrt(max(square * degrees / float(chi2.ppf(LEVEL, degrees)) - expected, 0.0)))
+    if significant and excess <= 0.0:
+        raise EstimationError(
+            f"{readings.file}: the strong readings scatter more than their noise, but the weak ones' noise, up to "
+            f"{float(np.max(noise[on])) / MILLIRADIAN:.3g} mrad, hides by how much (expected similar amplitudes: leave "
+            "the weak ones out)"
+        )
     slope = 0.5 / value if significant else 0.5 / max(np.sqrt(u_square), np.finfo(float).tiny)
     inputs = [
         SharedInput(
@@ -163,12 +168,12 @@ class StepRatio(NamedTuple):
 def _steps(departure: np.ndarray, on: np.ndarray, sets: Sequence[str]) -> StepRatio:
     """Mean square of the steps within sets over twice the mean square about their means.
 
-    Of independent readings it is 1 with the variance 1/n, whatever their distribution, for many readings.
+    A step is that to the set's next reading, also where other sets were read in between. Of independent readings the
+    ratio is 1 with the variance 1/n, whatever their distribution, for many readings.
     """
-    names = [sets[k] for k in on]
-    follows = np.array([one == after for one, after in pairwise(names)])
-    squares = float(np.mean(departure[on] ** 2)) * len(on) / max(len(on) - len(set(names)), 1)
-    step = np.diff(departure[on])[follows]
+    names = np.array([sets[k] for k in on])
+    step = np.concatenate([np.diff(departure[on][names == name]) for name in np.unique(names)])
+    squares = float(np.sum(departure[on] ** 2)) / len(step)
     ratio = float(np.mean(step**2) / (2.0 * squares)) if squares > 0.0 else 1.0
     return StepRatio(ratio, 1.0 - DRIFT / np.sqrt(len(step)))
 
