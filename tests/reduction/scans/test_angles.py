@@ -110,3 +110,12 @@ def test_too_few_readings_darkness_and_an_unknown_kind_are_refused():
     with pytest.raises(InputError, match=r"kind 'cube' is unknown \(expected one of ball, bare-prism"):
         compared(readings(value + 1.0), kind="cube")
     assert list(drawn_kinds(SIZES)) == ["ball", "hollow cube", "prism with silvered faces", "bare prism"]
+
+
+def test_chi_square_counts_the_background_s_prior_as_its_degrees_of_freedom_do():
+    """A background of 0.1 mW is 5 times the noise, 2.5 u of its prior."""
+    value = measured("prism with silvered faces", np.random.default_rng(5), "mW").value
+    fit = compared(readings(value, "mW")).fit
+    of_readings = np.sum(((value - fit.predicted) / fit.sigma) ** 2)
+    assert fit.chi2 - of_readings == pytest.approx((fit.values[1] / 0.04) ** 2, rel=1e-9)
+    assert fit.degrees_of_freedom == len(value) + 1 - 3

@@ -31,7 +31,7 @@ KINDS = Table[tuple[KindFit, ...]](
             ".4f",
         ),
         Column("u_rotation_zero_deg", "deg", "its standard uncertainty", each(lambda fit: fit.u[3] / DEGREE), ".4f"),
-        Column("chi2", "", "of the readings", each(lambda fit: fit.chi2), ".3f"),
+        Column("chi2", "", "of the readings and the background's prior", each(lambda fit: fit.chi2), ".3f"),
         Column("degrees_of_freedom", "", "of the readings", each(lambda fit: fit.degrees_of_freedom)),
         Column("p", "", "probability of a larger chi-square", each(lambda fit: fit.p), ".3g"),
         Column("half_deg", "deg", "incidence at half of the normal return", each(lambda fit: fit.half / DEGREE), ".2f"),

@@ -53,7 +53,7 @@ class KindFit:
     determined   (4,) bool
     predicted    (n,) in the readings' unit
     sigma        (n,) standard uncertainty of each reading
-    chi2, degrees_of_freedom   of the readings
+    chi2, degrees_of_freedom   of the readings and the background's prior
     quadrature   True if the background adds its square
     share        theory: share over that at normal incidence, of incidence, azimuth and perhaps analyser in rad
     """
@@ -262,7 +262,7 @@ def _fitted(
     values[3] = np.mod(values[3] + 0.5 * SECTOR, SECTOR) - 0.5 * SECTOR if depends else 0.0
     covariance, determined = _covariance(jac, free)
     predicted = _model(p, r.incidence, r.rotation, share, quadrature, analyser)
-    chi2 = float(np.sum(((r.value - predicted) / sigma) ** 2))
+    chi2 = float(np.sum(((r.value - predicted) / sigma) ** 2) + (p[1] / (DARK * noise)) ** 2)
     dof = len(r) - int(determined.sum()) + 1  # the background's prior counts
     return KindFit(
         kind=label,
