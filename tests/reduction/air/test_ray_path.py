@@ -132,6 +132,14 @@ def test_the_u_of_the_angle_and_of_the_mean_are_their_scatter():
     assert 0.75 < np.std(means) < 1.15
 
 
+def test_a_steep_arc_bends_by_the_gradient_across_it_and_so_does_its_u():
+    """Chord of 3 in 5 upwards: its cosine is 4/5, of curvature and u alike."""
+    found = between(20.0 - 0.02 * Z, [0.0, 0.0, 5.0], [40.0, 0.0, 35.0])
+    assert found.u_gradient > 0.0
+    assert found.u_curvature == pytest.approx(0.8 * found.u_gradient, rel=1e-12)
+    assert found.arc_curvature == pytest.approx(-0.8 * found.gradient, rel=1e-3)  # the index, 1.0003
+
+
 def test_a_vertical_path_is_straight():
     found = between((7.0, 8.0, 9.0, 9.5), (0, 0, 2), (0, 0, 45))
     assert (found.angles, found.ray_sag, found.arc_curvature) == ((0.0, 0.0), 0.0, pytest.approx(0.0, abs=1e-20))

@@ -10,7 +10,7 @@ from catseye.constants import DEGREE
 from catseye.errors import EstimationError
 from catseye.ranger.motion_units import SAMPLE_TIME, acceleration_integer, velocity_integer
 from catseye.records.laboratory.move_table import RecordedMove
-from catseye.reduction.steering.servo_identification import ServoLoop, identify_axis
+from catseye.reduction.steering.servo_identification import ServoLoop, _equation, _starts, identify_axis
 from catseye.simulator.servo.axis import ServoAxis
 from catseye.simulator.servo.motion_chip import MotionChip
 from catseye.simulator.servo.motor import AxisDesign, Motor
@@ -49,6 +49,20 @@ def test_axes_are_recovered_within_their_u_over_seeds():
     assert (np.sqrt(np.mean(pulls**2, axis=0)) < 1.6).all()
     assert (np.sqrt(np.mean(pulls**2, axis=0)) > 0.5).all()
     assert np.mean([fit.u[0] for fit in fits]) < 0.004 * truth_of(DESIGN)[0]
+
+
+def test_u_of_the_friction_is_that_of_a_fit_with_the_friction_itself_as_unknown():
+    """The equations are linear in gain times friction; here their derivatives by the friction, [JCGM102] eq. 3."""
+    fit = identify_axis(chip_moves(1))
+    gain, _, friction, delay = fit.values
+    windows = [(fit.moves[k], i) for k in range(len(fit.moves)) for i in _starts(fit.moves[k])]
+    measured, drive, slope, sign, speed = np.array([_equation(move, i, delay) for move, i in windows]).T
+    assert measured == pytest.approx(fit.measured)
+    slopes = np.column_stack([drive - friction * sign, speed, -gain * sign, gain * slope])
+    scale = np.sqrt(np.mean(slopes**2, axis=0))
+    inverse = np.linalg.inv((slopes / scale).T @ (slopes / scale)) / np.outer(scale, scale)
+    variance = float(fit.residual @ fit.residual) / (len(measured) - 4)
+    assert fit.covariance == pytest.approx(variance * inverse, rel=1e-4)  # the last step of the delay
 
 
 def test_an_axis_that_scipy_integrated_with_a_longer_delay():

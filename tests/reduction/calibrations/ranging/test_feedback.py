@@ -79,3 +79,11 @@ def test_weak_readings_that_hide_the_excess_of_strong_ones_are_refused():
     phase = 3.0 + np.append(rng.normal(0.0, 3 * 6e-5, 30), rng.normal(0.0, 0.5 * 6e-3, 30))
     with pytest.raises(EstimationError, match=r"weak ones' noise, up to 6 mrad, hides"):
         sheet(phase, np.repeat([5.0, 0.05], 30), ["near"] * 30 + ["far"] * 30)
+
+
+def test_a_normal_excess_scatters_as_claimed():
+    """Standard deviation of 300 over the claim: 1 within 4 of its own, 4 / sqrt(600)."""
+    rng = np.random.default_rng(9)
+    found = [sheet(rng.normal(3.0, 1e-3, 60), np.full(60, 5.0), ["near"] * 60) for _ in range(300)]
+    claimed = np.sqrt(np.mean([f.covariance[0, 0] for f in found]))
+    assert np.std([f.value("feedback_rad") for f in found]) / claimed == pytest.approx(1.0, abs=0.16)
