@@ -86,7 +86,7 @@ def centred_places(
 
     Each step reads `quadrant_position` to first order. Near the middle the place is a first-order autoregression, whose
     standard deviation is `settled_noise`; from outside the ratio saturates and the spot returns at a constant pace of
-    gain times `centre_slope`.
+    gain times `centre_slope`. A spot wholly in the gap gives no reading, and stays.
 
     Raises ValidityError for a gain that is not stable.
     """

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.gateways.writers.cells import aligned
 from catseye.gateways.writers.passage import Passage
 from catseye.geometry.antenna.rigid_telescope import PARENTS
 from catseye.names import counted
@@ -98,8 +99,7 @@ def conversion_lines(conversion: ConvertedPoints) -> list[str]:
     for k, name in enumerate(conversion.names):
         row = [name, *(f"{v:.6f}" for v in (*conversion.before[k], *conversion.after[k].round(9) + 0.0))]
         rows.append(row if u is None else [*row, *(f"{v:.3f}" for v in u[k])])
-    width = [max(len(row[i]) for row in rows) for i in range(len(headings))]
-    return ["  ".join(cell.rjust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in rows]
+    return aligned(rows)
 
 
 def _chain(frame: str | None) -> Iterator[str]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import DEGREE, MILLIMETRE
+from catseye.gateways.writers.cells import aligned
 from catseye.gateways.writers.output import atomic_file
 from catseye.geometry.sky.time_tag import utc_text
 from catseye.reduction.site.stations import Pointings
@@ -93,8 +94,7 @@ def pointing_table(pointings: Pointings) -> str:
                 _allowed(bool(pointings.allowed[k]), bool(pointings.prime_allowed[k])),
             )
         )
-    width = [max(len(row[i]) for row in rows) for i in range(len(HEADINGS))]
-    return "\n".join("  ".join(cell.rjust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in rows)
+    return "\n".join(aligned(rows))
 
 
 def _allowed(direct: bool, prime: bool) -> str:

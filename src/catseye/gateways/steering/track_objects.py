@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from catseye.gateways.writers.cells import aligned
 from catseye.gateways.writers.passage import Passage
 from catseye.reduction.steering.ground_track import GroundTrack
 
@@ -49,7 +50,7 @@ def track_lines(followed: GroundTrack) -> list[str]:
             worst = (*worst, 1e3 * followed.worst_ideal[k])
         pointing = "prime" if prime[k] else "direct"
         rows.append((str(k), pointing, *(f"{v:.3f}" for v in ends), *(f"{v:.2g}" for v in worst)))
-    lines = _aligned(rows)
+    lines = aligned(rows)
     if followed.followed.any():
         k = int(np.flatnonzero(followed.followed)[0])
         since, listed = followed.track.since, min(MOST_NODES, len(followed.track.since) - 1)
@@ -57,14 +58,8 @@ def track_lines(followed: GroundTrack) -> list[str]:
         for i in range(listed):
             at = (counts[i, k, 0], counts[i + 1, k, 0], counts[i, k, 1], counts[i + 1, k, 1])
             nodes.append((str(i), f"{since[i]:.3f}", f"{since[i + 1]:.3f}", *(f"{v:.3f}" for v in at)))
-        lines += ["", *_aligned(nodes)]
+        lines += ["", *aligned(nodes)]
         more = len(since) - 1 - listed
         if more:
             lines.append(f"... and {more} more: nodes.csv of --out")
     return lines
-
-
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    """Rows in columns, right-aligned."""
-    width = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return ["  ".join(cell.rjust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in rows]

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from catseye.constants import ARCSECOND, DEGREE, MILLIMETRE
+from catseye.gateways.writers.cells import aligned
 from catseye.gateways.writers.passage import Passage
 from catseye.reduction.structure.arm_motion import ArmMotion
 from catseye.reduction.structure.following import FollowedVibration
@@ -106,7 +107,7 @@ def following_lines(vibration: FollowedVibration, motion: ArmMotion | None) -> l
     u = np.sqrt(np.diagonal(vibration.covariance, axis1=-2, axis2=-1))
     for lead, at, spread in zip(vibration.leads, vibration.predicted, u, strict=True):
         rows.append([f"{lead:.3f}", *(f"{v / MILLIMETRE:.3f}" for v in (*at, *spread))])
-    lines = _aligned(rows)
+    lines = aligned(rows)
     if motion is None:
         return lines
     rows = [["ahead s", *(f"shift {a} mm" for a in "xyz"), *(f"turn {a} arcsec" for a in "xyz")]]
@@ -116,10 +117,4 @@ def following_lines(vibration: FollowedVibration, motion: ArmMotion | None) -> l
         row = [f"{lead:.3f}", *(f"{v / MILLIMETRE:.3f}" for v in motion.six[k, :3])]
         row += [f"{v / ARCSECOND:.2f}" for v in motion.six[k, 3:]]
         rows.append(row if motion.moved is None else row + [f"{v / MILLIMETRE:.3f}" for v in motion.moved[k]])
-    return [*lines, "", *_aligned(rows)]
-
-
-def _aligned(rows: list[list[str]]) -> list[str]:
-    """Rows in columns, right-aligned."""
-    width = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-    return ["  ".join(cell.rjust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in rows]
+    return [*lines, "", *aligned(rows)]

@@ -1,4 +1,6 @@
-"""Table cells that are safe to open in other programs."""
+"""Table cells: safe to open in other programs, and aligned for a terminal."""
+
+from collections.abc import Sequence
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a spreadsheet begins to compute
 
@@ -18,3 +20,15 @@ def harmless(text: str) -> str:
     except ValueError:
         return f"'{text}"
     return text
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table in columns, right-aligned.
+
+    rows   of as many cells each
+
+    >>> aligned([["point", "x"], ["1", "-0.5"]])
+    ['point     x', '    1  -0.5']
+    """
+    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.rjust(w) for cell, w in zip(row, width, strict=True)).rstrip() for row in rows]

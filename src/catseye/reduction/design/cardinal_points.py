@@ -119,8 +119,8 @@ class PointChoice:
         before, after = self.candidates.u([]), self.candidates.u(self.order)
         return tuple(
             label
-            for label, was, moment in zip(self.candidates.labels, before, after, strict=True)
-            if moment > DETERMINED * was
+            for label, prior, posterior in zip(self.candidates.labels, before, after, strict=True)
+            if posterior > DETERMINED * prior
         )
 
     @property
@@ -129,7 +129,9 @@ class PointChoice:
         share = f"{self.gains[-1] / self.of_all:.0%} of the information of all {len(self.candidates.names)} points"
         if self.undetermined:
             some = ", ".join(self.undetermined[:3]) + (", ..." if len(self.undetermined) > 3 else "")
-            return Verdict("doubtful", f"{len(self.undetermined)} coefficients keep half of their prior's u: {some}")
+            return Verdict(
+                "doubtful", f"{len(self.undetermined)} coefficients keep more than half of their prior's u: {some}"
+            )
         return Verdict("good", f"every coefficient is determined, with {share}")
 
     @property
