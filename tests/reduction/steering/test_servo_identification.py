@@ -93,6 +93,16 @@ def test_a_tuned_filter_is_that_of_the_true_axis():
     assert np.allclose(chosen.values[:3], ideal.values[:3], rtol=0.02)
 
 
+@pytest.mark.parametrize(("row", "name"), [(1, "decay"), (2, "friction"), (3, "delay")])
+def test_a_negative_value_that_no_axis_has_is_doubtful(row, name):
+    fit = identify_axis(chip_moves(1))
+    values = fit.values.copy()
+    values[row] = -2.9 * fit.u[row]
+    assert replace(fit, values=values).verdict.word == "good"
+    values[row] = -5.0 * fit.u[row]
+    assert replace(fit, values=values.copy()).verdict.why == f"the {name} is negative by 5.0 u, which no axis has"
+
+
 def test_moves_one_way_are_doubtful():
     verdict = identify_axis(chip_moves(3, targets=(4000, 8000))).verdict
     assert verdict.word == "doubtful"

@@ -108,7 +108,10 @@ def identify_servo(
 
 
 def _loop(fit: "ServoFit", gains: tuple[int, int, int, int]) -> "ServoLoop":
-    """Loop of the identified axis: the drive's delay beyond the chip's sample is in it."""
+    """Loop of the identified axis: the drive's delay beyond the chip's sample is in it.
+
+    Decay and friction below 0 count as 0: within 3 u that is their noise, beyond it the fit's verdict is doubtful.
+    """
     from catseye.errors import ValidityError
     from catseye.reduction.steering.servo_identification import ServoLoop
     from catseye.simulator.servo.tuning import Filter, Plant, bandwidth, margins

@@ -114,11 +114,11 @@ class ServoFit:
     @cached_property
     def verdict(self) -> Verdict:
         """Good where the moves agree with the axis within their counts."""
-        gain, _, friction, delay = self.values
+        gain = self.values[0]
         signs = {float(np.sign(np.ptp(m.position) and m.position[-1] - m.position[0])) for m in self.moves}
         if self.u[0] > LARGEST_U * gain:
             return Verdict("doubtful", f"the gain is known to {100.0 * self.u[0] / gain:.0f} % only")
-        for name, value, u in (("friction", friction, self.u[2]), ("delay", delay, self.u[3])):
+        for name, value, u in zip(NAMES[1:], self.values[1:], self.u[1:], strict=True):
             if value < -3.0 * u:
                 return Verdict("doubtful", f"the {name} is negative by {-value / u:.1f} u, which no axis has")
         if self.scatter > LARGEST_FACTOR * self.expected:
