@@ -271,7 +271,7 @@ class MadeUpWatch:
     async def samplers(self):
         return {"samplers": [{"name": "FOCUS", "values": 1, "columns": ["epoch", "along_axis_m", "verdict"]}]}
 
-    async def sampler(self, name, limit=1):
+    async def sampler(self, name, limit=1, at=None):
         if name.upper() != "FOCUS":
             raise InputError(f"{name!a} is not a sampler")
         return {"name": "FOCUS", "mjd": [MJD], "columns": {"epoch": [3.0], "along_axis_m": [None], "verdict": ["good"]}}

@@ -244,8 +244,9 @@ async def sampler(
     request: Request,
     name: Name,
     limit: Annotated[int, Query(ge=1, le=4096, description="so many of the latest")] = 100,
+    at: At = None,
 ) -> Response:
-    return await asked(request, lambda watch: watch.sampler(name, limit))
+    return await asked(request, lambda watch: watch.sampler(name, limit, at))
 
 
 @router.get("/report", tags=["result"], summary="Report of a result", response_model=models.ReportJson)

@@ -12,10 +12,16 @@ class Scene:
 
     def __init__(self):
         self.values = {"round_s": "10", "reference_every_s": "60", "mode": "active"}
-        self.told, self.obstacle = [], None
+        self.told, self.active, self.obstacle = [], [], None
         between = [ClientParameter(ROWS[n], self.now(n), str) for n in ("round_s", "reference_every_s")]
         mode = ClientParameter(ROWS["mode"], self.now("mode"), str, lambda text: self.values.update(mode=text))
-        self.parameters = Parameters((mode, *between), refuse=self.refuse, adopt=self.values.update, tell=self.tell)
+        self.parameters = Parameters(
+            (mode, *between),
+            refuse=self.refuse,
+            adopt=self.values.update,
+            tell=self.tell,
+            activated=lambda values: self.active.append(dict(values)),
+        )
 
     def now(self, name):
         return lambda: self.values[name]
@@ -42,7 +48,9 @@ def test_set_is_active_at_the_border_only(scene):
     assert (p.prepare(), p.start()) == (2, 2)
     assert scene.values == {"round_s": "10", "reference_every_s": "60", "mode": "hold"}
     assert [row[:3] for row in p.rows()][1] == ("round_s", "10", "20")
+    assert scene.active == []
     p.border()
+    assert scene.active == [{"round_s": "20"}]
     assert scene.values["round_s"] == "20"
     assert [row[:3] for row in p.rows()][1] == ("round_s", "20", "none")
     expected = "started: round_s from 10 to 20; mode from active to hold"

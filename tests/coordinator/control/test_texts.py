@@ -20,6 +20,9 @@ def test_scan_list_has_names_and_patterns():
 def test_last_priority_that_fits_counts():
     assert texts.priorities("*=2 ZG*=0.5 ZG12=8", NAMES) == {"DP001": 2.0, "ZEG3": 2.0, "ZG11": 0.5, "ZG12": 8.0}
     assert texts.priorities("none", NAMES) == {}
+    assert texts.priorities("ZG* = 2  ZG12 =8", NAMES) == {"ZG11": 2.0, "ZG12": 8.0}
+    with pytest.raises(InputError, match=r"'ZG\*' \(expected name=factor"):
+        texts.priorities("ZG* 10", NAMES)
     for text in ("ZG11=0", "ZG11=1e9", "ZG11=much", "ZG11", "ZG11=nan"):
         with pytest.raises(InputError, match="priorities"):
             texts.priorities(text, NAMES)

@@ -12,7 +12,7 @@ from catseye.coordinator.samplers.columns import COLUMNS
 from catseye.coordinator.samplers.corrections import FRAME, NO_ZERO, PIVOT, CorrectionOutput
 from catseye.coordinator.samplers.health import health_row
 from catseye.coordinator.samplers.pose_rows import Row
-from catseye.coordinator.samplers.rings import RING_LENGTH, Samplers, plain
+from catseye.coordinator.samplers.rings import PARAMETERS_ACTIVE, RING_LENGTH, Samplers, plain
 from catseye.coordinator.samplers.surface import SurfaceWatch
 from catseye.coordinator.ziy import Coordinator
 from catseye.errors import InputError
@@ -91,11 +91,17 @@ class Board:
             kind, severity = ("parameters", "note") if active else ("parameters-refused", "alarm")
             log.tell(kind, text, cast(Severity, severity), always=True, **values)
 
+        def activated(values: Mapping[str, str]) -> None:
+            text = "; ".join(f"{name} = {value}" for name, value in values.items())
+            log.tell(PARAMETERS_ACTIVE, f"active from this round on: {text}", "debug", always=True, **values)
+
         if control is None:
-            self.parameters = Parameters(own, tell=tell)
+            self.parameters = Parameters(own, tell=tell, activated=activated)
         else:
             everything = (*own, *control.parameters)
-            self.parameters = Parameters(everything, refuse=control.refuse, adopt=control.adopt, tell=tell)
+            self.parameters = Parameters(
+                everything, refuse=control.refuse, adopt=control.adopt, tell=tell, activated=activated
+            )
         coordinator.at_border.append(self.parameters.border)
         self._commands: dict[str, tuple[tuple[int, ...], Callable[[tuple[str, ...]], Rows]]] = {
             "STATUS": ((0,), lambda _: self._status()),

@@ -79,7 +79,7 @@ class SiteControl:
 
         def ranked(text: str) -> str:
             texts.priorities(text, targets)
-            return "none" if text.lower() == "none" else text.upper()
+            return "none" if text.lower() == "none" else texts.joined_pairs(text.upper())
 
         def placed(text: str) -> str:
             return texts.positions_text(texts.positions_mm(text, self._ziy.site.targets))

@@ -32,6 +32,7 @@ class Parameters:
     refuse   raises InputError for values, all parameters', that do not fit together
     adopt    activates the values of a set that has been started, at `border`
     tell     called with each set that is started or, at the border, refused: its text, values, and True if active
+    activated  called at the border with the values that are in force from then on
     """
 
     def __init__(
@@ -41,9 +42,10 @@ class Parameters:
         refuse: Callable[[Values], None] = lambda values: None,
         adopt: Callable[[Values], None] = lambda values: None,
         tell: Callable[[str, Values, bool], None] = lambda text, values, active: None,
+        activated: Callable[[Values], None] = lambda values: None,
     ):
         self._all = {p.row.name: p for p in parameters}
-        self._refuse, self._adopt, self._tell = refuse, adopt, tell
+        self._refuse, self._adopt, self._tell, self._activated = refuse, adopt, tell, activated
         self._set: dict[str, str] = {}
         self._started: dict[str, str] = {}
         self._prepared = False
@@ -105,6 +107,8 @@ class Parameters:
             self._adopt(started)
         except InputError as problem:
             self._tell(f"not active, nothing is changed: {problem}", started, False)
+        else:
+            self._activated(started)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Name, current value, waiting value or none, legal values, unit, what it changes, meaning, stage."""

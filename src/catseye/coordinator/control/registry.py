@@ -122,7 +122,7 @@ ROWS = {
         _text(
             "priorities",
             "",
-            "name or pattern = 0.001 to 1000, with blanks between, or none",
+            "name=factor or pattern=factor, 0.001 to 1000, with blanks between, or none",
             "plan",
             "factors of the worth of a target's shots; the last that fits counts",
         ),

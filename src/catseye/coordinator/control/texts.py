@@ -1,5 +1,6 @@
 """Values of parameters of free text: lists of names, priorities, positions, boxes."""
 
+import re
 from collections.abc import Collection, Iterable, Mapping
 from fnmatch import fnmatchcase
 
@@ -49,14 +50,18 @@ def scan_list(text: str, names: Collection[str]) -> frozenset[str] | None:
 
 
 def priorities(text: str, names: Collection[str]) -> dict[str, float]:
-    """Factors by target: the last that fits counts.
+    """Factors by target: the last that fits counts; blanks around = are allowed.
 
-    >>> priorities("ZG*=2 ZG11=0.5", ["ZG11", "ZG12"])
+    Raises InputError: no factor, an illegal one, or a pattern that none fits.
+
+    >>> priorities("ZG*=2 ZG11 = 0.5", ["ZG11", "ZG12"])
     {'ZG11': 0.5, 'ZG12': 2.0}
     """
     factors: dict[str, float] = {}
-    for word in [] if text.lower() == NONE else text.split():
-        pattern, _, number = word.partition("=")
+    for word in [] if text.lower() == NONE else joined_pairs(text).split():
+        pattern, equals, number = word.partition("=")
+        if not (pattern and equals and number):
+            raise InputError(f"priorities {word[:30]!a} (expected name=factor, such as TR*=2, with blanks between)")
         factor = _number("priorities", number)
         if not LOWEST_PRIORITY <= factor <= HIGHEST_PRIORITY:
             raise InputError(
@@ -65,6 +70,15 @@ def priorities(text: str, names: Collection[str]) -> dict[str, float]:
         for fitting in matching([pattern], names, "targets").values():
             factors |= dict.fromkeys(fitting, factor)
     return dict(sorted(factors.items()))
+
+
+def joined_pairs(text: str) -> str:
+    """Text without blanks around =.
+
+    >>> joined_pairs("TR* = 2  ZEG*=0.5")
+    'TR*=2 ZEG*=0.5'
+    """
+    return " ".join(re.sub(r"\s*=\s*", "=", text).split())
 
 
 def positions_mm(text: str, targets: dict[str, TargetRow]) -> dict[str, Position]:
@@ -78,8 +92,10 @@ def positions_mm(text: str, targets: dict[str, TargetRow]) -> dict[str, Position
             raise InputError(f"target_positions {' '.join(words)[:40]!a} (expected name x y z, with ; between targets)")
         name = words[0].upper()
         target = targets.get(name)
-        if target is None or target.shapes_dish:
-            raise InputError(f"target_positions {words[0][:20]!a} is not a single target beside the dish")
+        if target is None:
+            raise InputError(f"target_positions {words[0][:20]!a} has no record of its own at this site")
+        if target.shapes_dish:
+            raise InputError(f"target_positions {name} shapes the dish (expected a target beside the dish)")
         x, y, z = (_number("target_positions", word) for word in words[1:])
         away = float(np.linalg.norm(np.array([x, y, z]) - np.array(target.position_mm)))
         if not away <= LONGEST_MOVE_MM:

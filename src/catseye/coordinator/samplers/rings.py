@@ -19,6 +19,7 @@ from catseye.records.night.live import Happening, LivePosture, LiveWeather
 
 RING_LENGTH = 4096  # values of each sampler
 MOVED = "actuator-moved"  # kind of the event of another actuator's move
+PARAMETERS_ACTIVE = "parameters-active"  # kind of the event behind which a started set is in force
 Listener = Callable[[str, "Row | EpochPoint"], None]  # a sampler, and its new row
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from catseye.coordinator.control.registry import ROWS
 from catseye.coordinator.samplers.columns import COLUMNS, TEXTS
+from catseye.coordinator.samplers.pose_rows import Row
 from catseye.ranger.line import Reply, parse_stamp
 from catseye.service.watch.entries import Object, mjd_of, number
 
@@ -35,8 +36,12 @@ def samplers_object(replies: Sequence[Reply]) -> Object:
 
 def sampler_object(name: str, replies: Sequence[Reply]) -> Object:
     """Values of rows of SAMPLER as columns."""
+    return rows_object(name, [reply.values[1:] for reply in replies if len(reply.values) == len(COLUMNS[name]) + 2])
+
+
+def rows_object(name: str, rows: Sequence[Row]) -> Object:
+    """Values of a sampler's rows, a stamp and its columns each, as columns."""
     columns = COLUMNS[name]
-    rows = [reply.values[1:] for reply in replies if len(reply.values) == len(columns) + 2]
     values = {column: [_value(column, row[k]) for row in rows] for k, column in enumerate(columns, start=1)}
     return {"name": name, "mjd": [mjd_of(parse_stamp(row[0])) for row in rows], "columns": values}
 

@@ -23,6 +23,7 @@ from catseye.service.watch.site_map import SiteMap
 
 if TYPE_CHECKING:
     from catseye.service.watch.epochs import EpochRecord
+    from catseye.service.watch.journal_samplers import JournalSamplers
 
 Address = tuple[str, int]
 Listener = Callable[[str, Object], None]
@@ -57,6 +58,7 @@ class SiteWatch:
         self.listeners: list[Listener] = []
         self._place = journal
         self._opened: History | None = None
+        self._past_samplers: JournalSamplers | None = None
         self._consoles = dict(rangers or {})
         self._network, self._key = network, key
         if records is None:
@@ -167,15 +169,25 @@ class SiteWatch:
         """Samplers of the coordinator: values kept, columns."""
         return samplers_object(await self._asked("SAMPLERS"))
 
-    async def sampler(self, name: str, limit: int = 1) -> Object:
-        """Last values of a sampler as columns, oldest first."""
+    async def sampler(self, name: str, limit: int = 1, at: float | None = None) -> Object:
+        """Last values of a sampler as columns, oldest first; of the journal at an MJD, or without a living site."""
+        if at is not None or self.port is None:
+            return await asyncio.to_thread(self._past_sampler, name.upper(), limit, at)
         return sampler_object(name.upper(), await self._asked("SAMPLER", name, limit))
 
     async def _asked(self, command: str, *parameters: object) -> list[Reply]:
         """Replies of the coordinator; raises InputError where only a journal is watched, or it refuses."""
         if self.port is None:
-            raise InputError("a journal has no parameters and samplers (expected a living site)")
+            raise InputError("a journal has no parameters, and its samplers no list (expected a living site)")
         return await self.port.answers(command, *parameters)
+
+    def _past_sampler(self, name: str, limit: int, at: float | None) -> Object:
+        """Last values of a sampler by the journal."""
+        from catseye.service.watch.journal_samplers import JournalSamplers
+
+        if self._past_samplers is None:
+            self._past_samplers = JournalSamplers(self._journal())
+        return self._past_samplers.values(name, self._instant(at), limit)
 
     def _commands(self) -> CommandDesk:
         """Desk for commands; raises InputError where only a journal is watched."""
