@@ -337,6 +337,34 @@ def test_priority_draws_shots_and_a_low_one_repels_them(first):
     assert earliest(again, soonest) > earliest(first, soonest)
 
 
+@pytest.mark.parametrize("ball", ["TR06-B", "TR07-B", "TR09-B"])
+def test_shots_on_a_target_follow_its_priority(first, ball):
+    """A pass gives each target a shot; what has a higher priority comes again before the pass is over."""
+    counts = [shots_on(first, ball)]
+    for priority in (0.001, 10.0):
+        planner = RoundPlanner(few_prisms())
+        planner.priorities = {ball: priority}
+        again = planner.round(state(NIGHT))
+        counts.append(shots_on(again, ball))
+        assert sum(map(len, again.shots.values())) >= 0.9 * sum(map(len, first.shots.values()))
+    usual, low, high = counts
+    assert low <= 0.5 * usual
+    assert high >= 2 * usual
+
+
+def test_equal_priorities_change_nothing(first):
+    planner = RoundPlanner(few_prisms())
+    planner.priorities = dict.fromkeys(planner.retros, 7.0)
+    again = planner.round(state(NIGHT))
+    for name, shots in first.shots.items():
+        assert [(s.target, s.begin_ticks) for s in again.shots[name]] == [(s.target, s.begin_ticks) for s in shots]
+
+
+def shots_on(planned, target):
+    """Number of a round's shots on a target."""
+    return sum(shot.target == target for shots in planned.shots.values() for shot in shots)
+
+
 def test_rate_is_not_exceeded():
     planner = RoundPlanner(few_prisms(), settings=RoundSettings(interval=2.0))
     for name, shots in planner.round(state(NIGHT)).shots.items():

@@ -305,10 +305,17 @@ class RoundPlanner:
     def _open(self, turn: _Turn) -> NDArray[np.int64]:
         """Rows that fit into the remaining round.
 
-        Those surely free, or else those possibly free.
+        Those surely free, or else those possibly free. Beside what is not yet shot in this pass, what has a higher
+        priority than some of that competes again by its worth: a pass alone would give every target its shot.
         """
         code = turn.table.code[turn.row]
-        fits = turn.open_ & (turn.at + turn.table.moving[turn.row] + self._a_shot <= turn.until)
+        in_time = turn.at + turn.table.moving[turn.row] + self._a_shot <= turn.until
+        fits = turn.open_ & in_time
+        if not fits.any():
+            return np.flatnonzero(fits)
+        again = turn.counted & in_time & (turn.factor > turn.factor[fits].min())
+        again[turn.row] = False
+        fits |= again
         for category in (FREE, PERHAPS):
             rows = np.flatnonzero(fits & (code == category))
             if len(rows):
