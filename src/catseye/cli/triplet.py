@@ -63,8 +63,8 @@ def triplet(  # noqa: PLR0913 - its options are its command line
         raise typer.BadParameter("is for --write.", param_hint="'--replaces'")
     from catseye.api.laboratory import save_triplet_form
 
-    issue = _Issue(certificate, laboratory, job, replaces)
-    result = _reduced(files, out, issue, quiet=quiet) if files else None
+    issue = _Issue(certificate, laboratory, job, replaces, write)
+    result, records = _reduced(files, out, issue, quiet=quiet) if files else (None, ())
     if blank is not None:
         save_triplet_form(blank)
     blanks = None if blank is None else f"{blank}: the blank form"
@@ -72,7 +72,6 @@ def triplet(  # noqa: PLR0913 - its options are its command line
         if not quiet:
             say(wrapped("Written to", str(blanks)))
         return
-    records = () if write is None else result.save_records(write)
     files_of = None if out is None else f"{out}/: NAME.txt, NAME.html, NAME.json for each sheet, triplets.csv"
     written = [("Written to", files_of), ("Certificate", certificate), ("Written to", blanks)]
     written += [("Record", str(record)) for record in records]
@@ -87,16 +86,19 @@ def triplet(  # noqa: PLR0913 - its options are its command line
 
 
 class _Issue(NamedTuple):
-    """Certificate to write, its laboratory and its job; record of the replaced unit."""
+    """Certificate to write, its laboratory and its job; record of the replaced unit, and record to write."""
 
     certificate: Path | None
     laboratory: Path | None
     job: Path | None
     replaces: Path | None
+    write: Path | None
 
 
-def _reduced(files: list[Path], out: Path | None, issue: _Issue, *, quiet: bool) -> "TripletsResult":
-    """Sheets reduced, in order; with an `out`, written whole or not."""
+def _reduced(
+    files: list[Path], out: Path | None, issue: _Issue, *, quiet: bool
+) -> "tuple[TripletsResult, tuple[Path, ...]]":
+    """Sheets reduced, in order, and records written; with an `out`, written whole or not, after the records."""
     from catseye.api.laboratory import triplet as reduced
     from catseye.api.result import require_writable, save
 
@@ -104,10 +106,11 @@ def _reduced(files: list[Path], out: Path | None, issue: _Issue, *, quiet: bool)
     progress = ProgressLine(quiet)
     try:
         result = reduced(*files, laboratory=issue.laboratory, job=issue.job, replaces=issue.replaces, progress=progress)
+        records = () if issue.write is None else result.save_records(issue.write)
         if out is not None:
             save(result, out, progress=progress, certificate=issue.certificate)
         else:
             result.save_pages(certificate=issue.certificate)
     finally:
         progress.clear()
-    return result
+    return result, records

@@ -97,3 +97,14 @@ def test_of_two_records_none_is_written_if_one_cannot_be(tmp_path):
 
 def test_replaces_without_write_is_wrong_usage(catseye):
     assert catseye(SHEET, "--replaces", OLD)[0] == 2
+
+
+def test_refused_record_leaves_no_output(catseye, tmp_path):
+    """The record is checked first: neither pages nor a certificate beside a refusal."""
+    out, page = tmp_path / "pages", tmp_path / "page.html"
+    status, said, complaint = catseye(SHEET, "--write", tmp_path, "--out", out)
+    assert (status, said) == (1, "")
+    assert "does not exist" in complaint
+    assert "--replaces" in complaint
+    assert catseye(BAD, "--write", tmp_path, "--replaces", OLD, "--certificate", page)[0] == 1
+    assert list(tmp_path.iterdir()) == []

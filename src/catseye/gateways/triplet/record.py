@@ -46,7 +46,7 @@ def record_text(path: Path, reduction: TripletReduction, *, sheet: str, digest: 
     if not base.is_file():
         raise InputError(
             f"{base}: does not exist (expected the record of {reduction.measurement.triplet}, or that of the "
-            "unit whose place it takes, as replaces)"
+            "unit whose place it takes: --replaces)"
         )
     record = read_record(base, TripletRecord)
     if replaces is None:
