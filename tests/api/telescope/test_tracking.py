@@ -1,5 +1,7 @@
 """`track`: nodes are the counts of `point` in that posture, errors those of the chord; feed arm, stars, refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from catseye.geometry.mirror.encoder import COUNTS_PER_RADIAN
 from catseye.geometry.mirror.pointing import in_mirror_axes
 from catseye.records.files.reading import read_record
 from catseye.records.site.mirror import MirrorGeometry
+from catseye.records.site.monument import MonumentGeometry
 from mirror_scene import sent, steered
 from repository import ROOT
 
@@ -188,3 +191,74 @@ def test_what_does_not_fit_is_refused_by_name(arguments, names):
     with pytest.raises(ArgumentError) as refused:
         catseye.track(**{"site": "gbt", "ranger": "ZY103", "points": [0.0, 54.0, 12.0], **arguments})
     assert set(refused.value.names) == names
+
+
+SHORT = {"start_deg": (145.0, 30.0), "end_deg": (145.2, 30.1), "interval_s": 1.0}
+U_KEYS = {  # key: the uncertainty of each of these numbers of the two records
+    "monument": {"u_x_mm": ("x_mm",), "u_y_mm": ("y_mm",), "u_z_mm": ("z_mm",), "u_alpha1_rad": ("alpha1_rad",),
+                 "u_alpha2_rad": ("alpha2_rad",), "u_alpha3_rad": ("alpha3_rad",)},
+    "mirror": {"u_offset_mm": ("dx_mm", "dy_mm", "dz_mm"), "u_beta_rad": ("beta1_rad", "beta2_rad"),
+               "u_zero_counts": ("na0", "ne0"),
+               "u_axis_mm": ("axis_offset_mm", "mirror_offset_mm", "beam_x_mm", "beam_y_mm")},
+}  # fmt: skip
+
+
+def drawn(record, keys, rng):
+    return record.model_copy(
+        update={name: getattr(record, name) + getattr(record, key) * rng.standard_normal()
+                for key, names in keys.items() for name in names}
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("frame", "to", "prime"), [("reflector", [20.0, 60.0, 18.0], False),
+                                                    ("alidade", [-21.3, 2.8, -37.0], True)])  # fmt: skip
+def test_the_uncertainty_of_the_counts_is_the_scatter_of_tracks_of_drawn_records(frame, to, prime):
+    monument = read_record(ROOT / "examples/monuments/ZY103.toml", MonumentGeometry)
+    mirror = read_record(ROOT / "examples" / OFF_AXIS, MirrorGeometry)
+    found = catseye.track(monument, mirror, to, frame=frame, **SHORT)
+    assert found.to_object()["uncertainties_lacking"] == []
+    assert bool(found.track.track.prime[0, 0]) is prime
+    rng, draws = np.random.default_rng(20031126), 400
+    counts = np.array([
+        catseye.track(drawn(monument, U_KEYS["monument"], rng), drawn(mirror, U_KEYS["mirror"], rng), to, frame=frame,
+                      **SHORT).counts for _ in range(draws)
+    ])  # fmt: skip
+    scatter = counts.std(axis=0, ddof=1)
+    np.testing.assert_allclose(scatter / found.u_counts, 1.0, atol=4.0 / np.sqrt(2.0 * draws))  # four sigma of it
+    apart = (counts[:, 1:] - counts[:, :-1]).std(axis=0)
+    assert np.all(apart < 0.05 * found.u_counts[:-1])  # all but common to both ends of an interval
+
+
+def test_nodes_have_the_uncertainty_of_point_in_that_posture():
+    monument = "monuments/ZY103.toml"
+    found = catseye.track(monument, OFF_AXIS, [[0.0, 54.0, 12.2], [20.0, 60.0, 18.0]], **SLEW)
+    for k in (0, 4, len(found.seconds) - 1):
+        for i, to in enumerate(([0.0, 54.0, 12.2], [20.0, 60.0, 18.0])):
+            at = catseye.convert(to, from_frame="reflector", to_frame="ground", posture_deg=slewed(found.seconds[k]))
+            still = catseye.point(monument, OFF_AXIS, at.points[0])
+            np.testing.assert_allclose(found.u_counts[k, i], still.u[0], rtol=1e-6)
+    nodes, counts = found.to_table("nodes"), found.to_table("counts")
+    assert nodes["u_azimuth_t1_counts"][1] == counts["u_azimuth_counts"][3] == found.u_counts[1, 1, 0]
+    assert nodes["u_elevation_t0_counts"][1] == counts["u_elevation_counts"][1] == found.u_counts[0, 1, 1]
+    assert "u of the counts is at most 0.9 in azimuth, 0.52 in elevation" in str(found)
+
+
+def test_a_feed_arm_ranger_s_nodes_have_the_uncertainty_of_point():
+    site = catseye.load("gbt")
+    arm = [ranger.model_copy(update={"u_mount_rad": 2e-4}) for ranger in site.feedarm.ranger]
+    mirrors = {name: mirror.model_copy(update={"u_beta_rad": 1e-5, "u_zero_counts": 0.5})
+               for name, mirror in site.mirrors.items()}  # fmt: skip
+    known = replace(site, feedarm=site.feedarm.model_copy(update={"ranger": tuple(arm)}), mirrors=mirrors)
+    found = catseye.track(site=known, ranger="ZY115", frame="ground", points=[0.0, 0.0, 10.0], **SLEW)
+    for k in (0, 4, len(found.seconds) - 1):
+        still = catseye.point(site=known, ranger="ZY115", to=[0.0, 0.0, 10.0], posture_deg=slewed(found.seconds[k]))
+        np.testing.assert_allclose(found.u_counts[k, 0], still.u[0], rtol=1e-6)
+    assert np.all(found.u_counts > 1.0)
+
+
+def test_counts_of_incomplete_records_have_no_uncertainty_and_the_missing_keys():
+    found = catseye.track(MONUMENT, "night-01/mirrors/ZP103.toml", [0.0, 54.0, 12.0], **SLEW)
+    assert np.all(np.isnan(found.u_counts))
+    lacking = ["u_alpha1_rad", "u_alpha2_rad", "u_alpha3_rad", "u_beta_rad", "u_zero_counts"]
+    assert found.to_object()["uncertainties_lacking"] == lacking
+    assert f"u of the counts is unknown: the records lack {', '.join(lacking)}" in " ".join(str(found).split())

@@ -47,6 +47,9 @@ class TrackResult(Result):
     mirror_counts  (k + 1, n, 2) counts less those of an ideal mirror: by axis offsets, tilts, encoder errors
     ideal_misses   (k, s, n) m, how far this mirror's beam passes its target at the ideal mirror's counts
     worst_ideal    (n,) m, the largest of each
+    u_counts       (k + 1, n, 2) standard uncertainty of the counts by the records of mirror, monument or feed arm, all
+                   but common to the ends of an interval; nan where the records lack a key, `track.lacking`. Points and
+                   posture count as exact
     frame      of the points
     read       files that were read
     """
@@ -62,6 +65,7 @@ class TrackResult(Result):
     mirror_counts: np.ndarray
     ideal_misses: np.ndarray
     worst_ideal: np.ndarray
+    u_counts: np.ndarray
     frame: str
     read: tuple[Path, ...] = field(default=())
 
@@ -79,8 +83,13 @@ class TrackResult(Result):
 
     def to_object(self) -> dict[str, Any]:
         """Arrays in SI and counts."""
-        names = ("seconds", "counts", "worst", "status", "worst_counts", "mirror_counts", "worst_ideal", "frame")
-        more = {"prime": self.track.track.prime[0], **self.track.ranger.names}
+        names = ("seconds", "counts", "u_counts", "worst", "status", "worst_counts", "mirror_counts", "worst_ideal")
+        more = {
+            "frame": self.frame,
+            "prime": self.track.track.prime[0],
+            "uncertainties_lacking": list(self.track.lacking),
+            **self.track.ranger.names,
+        }
         return {"verdict": self.verdict.to_object(), **{name: getattr(self, name) for name in names}, **more}
 
     def tables(self) -> "dict[str, QTable]":
@@ -91,12 +100,16 @@ class TrackResult(Result):
             "time": (np.repeat(self.seconds, n), "s"),
             "azimuth_counts": (self.counts[:, :, 0].ravel(), ""),
             "elevation_counts": (self.counts[:, :, 1].ravel(), ""),
+            "u_azimuth_counts": (self.u_counts[:, :, 0].ravel(), ""),
+            "u_elevation_counts": (self.u_counts[:, :, 1].ravel(), ""),
         }
         nodes: dict[str, tuple[Any, str]] = {"point": (np.tile(np.arange(n), k), "")}
         for name, part in (("t0", slice(None, -1)), ("t1", slice(1, None))):
             nodes[name] = (np.repeat(self.seconds[part], n), "s")
             nodes[f"azimuth_{name}_counts"] = (self.counts[part, :, 0].ravel(), "")
             nodes[f"elevation_{name}_counts"] = (self.counts[part, :, 1].ravel(), "")
+            nodes[f"u_azimuth_{name}_counts"] = (self.u_counts[part, :, 0].ravel(), "")
+            nodes[f"u_elevation_{name}_counts"] = (self.u_counts[part, :, 1].ravel(), "")
         for axis, name in enumerate(("azimuth", "elevation")):
             nodes[f"{name}_mirror_counts"] = (self.mirror_counts[:-1, :, axis].ravel(), "")
         worst = np.abs(self.errors).max(axis=1).reshape(-1, 2)
@@ -239,6 +252,7 @@ def track(
         mirror_counts=followed.mirror_counts,
         ideal_misses=followed.ideal_misses,
         worst_ideal=followed.worst_ideal,
+        u_counts=followed.u_counts,
         frame=frame,
         read=tuple(files.paths),
     )

@@ -54,7 +54,7 @@ class _Motion(NamedTuple):
 @app.command(
     epilog="\b\nExample: catseye track --site gbt --ranger ZY103 --to=0,54,12.2 --start 145,30 --end 146,31 "
     "--out slew\n"
-    "         catseye track --monument night-01/monuments/ZY103.toml --mirror mirrors/ZP103.toml --to=0,54,12.2 "
+    "         catseye track --monument monuments/ZY103.toml --mirror mirrors/ZP103.toml --to=0,54,12.2 "
     "--start 145,30 --end 146,31 --out offsets\n"
     "         catseye track --site gbt --ranger ZY115 --to=0,54,12.2 --to=20,60,18 --start 145,30 --end 146,31\n"
     "         catseye track --site gbt --ranger ZY103 --to=0,54,12.2 --star 83.63,22.01 --duration-s 60 "

@@ -20,6 +20,7 @@ def track_passages(followed: GroundTrack) -> Sequence[Passage]:
         worst, counts = 1e3 * followed.worst[good].max(), followed.worst_counts[good].max(axis=0)
         text += f"; beams pass them by {worst:.3g} mm at most, counts not rounded"
         text += f"; between t0 and t1 linear counts are off by {counts[0]:.2g} in azimuth, {counts[1]:.2g} in elevation"
+        text += f"; {_uncertainty(followed, good)}"
     bad = [f"point {k}: {why}" for k, why in enumerate(followed.status) if not good[k]]
     passages = [Passage("The track", text + "."), *(Passage("Not followed", line) for line in bad[:5])]
     if followed.ideal is not None and good.any():
@@ -29,6 +30,15 @@ def track_passages(followed: GroundTrack) -> Sequence[Passage]:
         text += f"the beam would pass its targets by {1e3 * followed.worst_ideal[good].max():.3g} mm at most"
         passages.append(Passage("The mirror", text + "."))
     return passages
+
+
+def _uncertainty(followed: GroundTrack, good: np.ndarray) -> str:
+    """Largest standard uncertainties of the counts, or the keys that the records lack."""
+    if followed.lacking:
+        return f"u of the counts is unknown: the records lack {', '.join(followed.lacking)}"
+    u = np.max(followed.u_counts[:, good], axis=(0, 1))
+    most = [f"{v:.2g}" if np.isfinite(v) else "unknown" for v in u]
+    return f"u of the counts is at most {most[0]} in azimuth, {most[1]} in elevation, all but common to t0 and t1"
 
 
 def track_lines(followed: GroundTrack) -> list[str]:

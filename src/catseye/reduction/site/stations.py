@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import InputError
@@ -110,28 +111,33 @@ def _imperfections(mirror: MirrorGeometry) -> Imperfections:
     )
 
 
-def imperfections_variance(station: MirrorStation, mirror: MirrorGeometry, to: np.ndarray) -> np.ndarray:
-    """Variance of the direct counts by the record's uncertainties.
+def imperfections_variance(
+    station: MirrorStation, mirror: MirrorGeometry, to: np.ndarray, *, prime: ArrayLike = False
+) -> np.ndarray:
+    """Variance of the counts by the record's uncertainties.
 
-    (n, 2), counts^2, for points (n, 3), m: uncertainties of offsets, tilts and encoder errors; zero where the
+    (..., 2), counts^2, for points (..., 3), m: uncertainties of offsets, tilts and encoder errors; zero where the
     record has none.
+
+    prime    (...), bool: in the prime pointing, in place of the direct one
 
     Each term is independent. A cosine and a sine term of one order, of u each, give u^2 at any angle.
 
     Source: [JCGM100] eq. 10; derivatives by central differences of the traced ray.
     """
     complete = _imperfections(mirror)
-    variance = np.zeros((len(to), 2))
+    variance = np.zeros((*to.shape[:-1], 2))
     for part, u in (("axes", (mirror.u_axis_mm or 0.0) * MILLIMETRE), ("tilts", mirror.u_tilt_rad or 0.0)):
         if u == 0.0:
             continue
         values, step = getattr(complete, part), STEPS[part]
         for away in step * np.eye(len(values)):
             forward, backward = (
-                imperfect_counts(station, replace(complete, **{part: values + sign * away}), to) for sign in (1, -1)
+                imperfect_counts(station, replace(complete, **{part: values + sign * away}), to, prime=prime)
+                for sign in (1, -1)
             )
             apart = forward - backward
-            apart[:, 0] -= COUNTS_PER_TURN * np.round(apart[:, 0] / COUNTS_PER_TURN)  # Theta's cut between them
+            apart[..., 0] -= COUNTS_PER_TURN * np.round(apart[..., 0] / COUNTS_PER_TURN)  # Theta's cut between them
             variance += np.square(u * apart / (2.0 * step))
     orders = np.array([complete.azimuth_waves.shape[1], complete.elevation_waves.shape[1]])
     return variance + np.square(mirror.u_encoder_counts or 0.0) * orders
@@ -251,10 +257,7 @@ def pointings_of(
     lower = prime[:, 0] - COUNTS_PER_TURN
     down = ~within(prime[:, 0], low, high) & within(lower, low, high)
     prime = np.column_stack([np.where(down, lower, prime[:, 0]), prime[:, 1]])
-    covariance, lacking = spread(to)
-    variance = np.diagonal(covariance, axis1=-2, axis2=-1) + imperfections_variance(station, mirror, to)
-    u = np.sqrt(variance)
-    u[:, 0] = np.fmin(u[:, 0], ANY_TURN)
+    u, lacking = counts_uncertainty(station, mirror, to, spread=spread)
     return Pointings(
         to=to,
         aim=aimed,
@@ -264,6 +267,27 @@ def pointings_of(
         back_retro=back,
         allowed=within(direct[:, 0], low, high),
         prime_allowed=within(prime[:, 0], low, high),
-        u=np.full_like(u, np.nan) if lacking else u,
+        u=u,
         lacking=lacking,
     )
+
+
+def counts_uncertainty(
+    station: MirrorStation, mirror: MirrorGeometry, to: np.ndarray, *, spread: CountsSpread, prime: ArrayLike = False
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Standard uncertainties (..., 2), counts, for points (..., 3), m, and the keys that the records lack.
+
+    NaN where they lack one; of an azimuth at most that of any turn.
+
+    station   of batch shape that broadcasts with the points'
+    spread    covariance (..., 2, 2) of the direct counts for points by the station, and the keys
+    prime     (...), bool: in the prime pointing, whose elevation is mirrored at ne0, so that the variances of
+              independent zeros and angles stay the same
+
+    Source: [JCGM102] eq. 3, first order.
+    """
+    covariance, lacking = spread(to)
+    variance = np.diagonal(covariance, axis1=-2, axis2=-1) + imperfections_variance(station, mirror, to, prime=prime)
+    u = np.sqrt(variance)
+    u[..., 0] = np.fmin(u[..., 0], ANY_TURN)
+    return np.full_like(u, np.nan) if lacking else u, lacking

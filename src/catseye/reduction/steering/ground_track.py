@@ -6,12 +6,14 @@ import numpy as np
 
 from catseye.geometry.antenna.rigid_telescope import BELOW_ELEVATION, RigidTelescope
 from catseye.geometry.sky.time_tag import TimeTag
-from catseye.reduction.site.stations import imperfections_of
+from catseye.reduction.site.stations import counts_uncertainty, imperfections_of
 from catseye.reduction.steering.mounted import MountedRanger
 from catseye.reduction.steering.tracking import (
     AntennaPath,
     CountTrack,
     Following,
+    Stations,
+    Targets,
     carried,
     count_errors,
     fixed,
@@ -33,6 +35,9 @@ class GroundTrack:
     ranger   that follows
     ideal    the same by a mirror without offsets, tilts and encoder errors; None where the record has none
     ideal_misses   (k, s, n) m, of this mirror's beam at the ideal mirror's counts; `misses` where the record has none
+    u_counts  (k + 1, n, 2) standard uncertainty of the counts at the ends of the intervals, by the records of mirror,
+              monument or feed arm; NaN where they lack a key, and for a point that is not followed
+    lacking   these keys
     """
 
     track: CountTrack
@@ -41,6 +46,8 @@ class GroundTrack:
     ranger: MountedRanger
     ideal: CountTrack | None
     ideal_misses: np.ndarray
+    u_counts: np.ndarray
+    lacking: tuple[str, ...]
 
     @property
     def followed(self) -> np.ndarray:
@@ -126,6 +133,7 @@ def follow_by(
         stations, targets, start, intervals=intervals, interval=interval, limits=limits, imperfections=imperfections
     )
     passed = misses(track, stations, targets, imperfections=imperfections)
+    u_counts, lacking = _uncertainty(ranger, track, stations, targets)
     ideal, passed_ideal = None, passed
     if imperfections is not None:
         ideal = ideal_track(track, stations, targets)
@@ -137,7 +145,27 @@ def follow_by(
         ranger=ranger,
         ideal=ideal,
         ideal_misses=passed_ideal[:, :, 0],
+        u_counts=u_counts,
+        lacking=lacking,
     )
+
+
+def _uncertainty(
+    ranger: MountedRanger, track: CountTrack, stations: Stations, targets: Targets
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Standard uncertainties (k + 1, n, 2), counts, of the nodes of the only ranger, and the keys that records lack."""
+    good = track.status[0] == Following.FOLLOWED
+    station, points = stations(track.since), targets(track.since)[:, :, good]
+    u, lacking = counts_uncertainty(
+        station,
+        ranger.mirror,
+        points,
+        spread=lambda to: ranger.counts_covariance(station, to),
+        prime=track.prime[None, :, good],
+    )
+    every = np.full((len(track.since), len(good), 2), np.nan)
+    every[:, good] = u[:, 0]
+    return every, lacking
 
 
 def _nodes(track: CountTrack) -> np.ndarray:

@@ -62,9 +62,9 @@ class MountedRanger:
         return feed_arm_station(self.arm, self.mirror, telescope.ground_from("reflector"))
 
     def counts_covariance(self, station: MirrorStation, to: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Covariance (n, 2, 2), counts^2, for points (n, 3), m, and the keys that the records lack.
+        """Covariance (..., 2, 2), counts^2, for points (..., 3), m, and the keys that the records lack.
 
-        station   of `station`
+        station   of `station`, or of several postures, whose batch shape broadcasts with the points'
 
         Lacking keys count as exact; on the feed arm the scan point has U_POSITION without one.
         """
