@@ -286,5 +286,7 @@ def test_python_takes_every_instrument_of_the_command(catseye):
     assert both.group_index.shape == both.standard_uncertainty.shape == (2,)
     with pytest.raises(face.ArgumentError, match=r"^pressure: give pressure_hpa or barometer_mmhg, not both$"):
         face.air(20.0, 933.0, 50.0, barometer_mmhg=700.0)
+    with pytest.raises(face.ArgumentError, match=r"^pressure: give pressure_hpa or barometer_mmhg$"):
+        face.air(20.0, humidity_percent=50.0)
     with pytest.raises(face.ArgumentError, match="u_dew_point_c does not belong to humidity_percent"):
         face.air(20.0, 933.0, 50.0, u_dew_point_c=0.2)

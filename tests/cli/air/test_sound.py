@@ -124,6 +124,7 @@ def test_people_read_the_same(command):
         ([*NOTES, "--u-temperature-c", -1], 2, "not a standard uncertainty"),
         (NOTES[:4], 2, "--humidity-percent is missing"),
         ([*NOTES, "--speed", 343], 2, "give --temperature-c or --speed, not both"),
+        (NOTES[2:], 2, "give --temperature-c or --speed"),
         (["--speed", 343, "--pressure-hpa", 933], 2, "give --humidity-percent or --vapour-pressure-hpa"),
         ([*NOTES, "--u-speed", 0.1], 2, "--u-speed belongs to --speed"),
         (["--speed", 343, *NOTES[2:], "--u-temperature-c", 0.1], 2, "--u-temperature-c does not belong to --speed"),

@@ -193,7 +193,8 @@ def read_path_readings(path: Path, sheet: PathSheet | None = None, sheet_hashes:
     for name in WEATHER:
         if name in table.cells:
             _limited(table, name, limits[name])
-    pressure = path_pressure(table, sheet.gravity_m_per_s2, path.with_suffix(".toml").name)
+    sheet_file = next(iter(sheet_hashes or ()), path.with_suffix(".toml").name)
+    pressure = path_pressure(table, sheet.gravity_m_per_s2, sheet_file)
     moist = path_humidity(table, _mean_of_read(temperature), pressure, sheet.air_model)
     sheet = _with_hygrometer(sheet, table, moist.per_unit)
     if "u_phase_rad" in table.cells:

@@ -154,7 +154,8 @@ def pressure_of(  # noqa: PLR0913 - an instrument with all that corrects it
     Raises ArgumentError: arguments that do not fit together; ValidityError: a station that is unknown or too far.
     """
     if (pressure_hpa is None) == (barometer_mmhg is None):
-        raise ArgumentError("pressure: give pressure_hpa or barometer_mmhg, not both", "pressure_hpa", "barometer_mmhg")
+        excess = "" if pressure_hpa is None else ", not both"
+        raise ArgumentError(f"pressure: give pressure_hpa or barometer_mmhg{excess}", "pressure_hpa", "barometer_mmhg")
     uncertainties = (u_pressure_hpa, u_barometer_mmhg, u_mercury_c)
     stated = any(np.any(np.asarray(u, dtype=float) > 0.0) for u in uncertainties)
     of_mercury = {

@@ -241,7 +241,8 @@ def require_weather(
     by_speed   arguments that belong to a speed, by name; None or 0 where not given
     """
     if (temperature_c is None) == (speed is None):
-        raise ArgumentError("give temperature_c or speed, not both", "temperature_c", "speed")
+        excess = "" if speed is None else ", not both"
+        raise ArgumentError(f"give temperature_c or speed{excess}", "temperature_c", "speed")
     if pressure_hpa is None:
         raise ArgumentError("pressure_hpa is missing", "pressure_hpa")
     if speed is not None:
@@ -270,7 +271,8 @@ def air_by_sound(measured: MeasuredSound, model: str = "parker2004") -> SoundSpe
     """
     moist = {"humidity_percent": measured.humidity_percent, "vapour_pressure_hpa": measured.vapour_pressure_hpa}
     if (measured.humidity_percent is None) == (measured.vapour_pressure_hpa is None):
-        raise ArgumentError("humidity: give humidity_percent or vapour_pressure_hpa, not both", *moist)
+        excess = "" if measured.humidity_percent is None else ", not both"
+        raise ArgumentError(f"humidity: give humidity_percent or vapour_pressure_hpa{excess}", *moist)
     for name, value in moist.items():
         if value is None and np.any(np.asarray(getattr(measured, f"u_{name}"), float) > 0.0):
             raise ArgumentError(f"u_{name} belongs to {name}", f"u_{name}", name)
