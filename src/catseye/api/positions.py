@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -230,9 +230,8 @@ def locate(
         both=both,
         averaging=method == "averaging",
         u_stations=read.u if np.any(read.u) else None,
+        names=(read.stations, read.targets) if paths else None,
     )
-    if paths:
-        found = replace(found, names=(read.stations, read.targets))
     return PositionsResult(verdict=found.verdict, located=found, paths=paths)
 
 

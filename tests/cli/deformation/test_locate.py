@@ -62,6 +62,16 @@ def test_spoilt_tables_are_refused_in_one_line(catseye, tmp_path, table, old, ne
     assert err.count("\n") == 1
 
 
+def test_the_refusal_of_averaging_names_the_target(catseye):
+    assert "target T01 has 6 ranges" in catseye("locate", STATIONS, RANGES, "--method", "averaging", "--near=0,0,30")[2]
+
+
+def test_the_worst_coordinate_is_told(catseye):
+    covariance = np.array(json.loads(catseye("locate", STATIONS, RANGES, "--json")[1])["covariance"])
+    worst = 1e3 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2).max())
+    assert f"the worst to {worst:.3g} mm" in " ".join(catseye("locate", STATIONS, RANGES)[1].split())
+
+
 def test_averaging_without_a_start_and_a_bad_start_are_wrong_usage(catseye):
     assert "--near is missing" in catseye("locate", STATIONS, THREE, "--method", "averaging")[2]
     status, _, err = catseye("locate", STATIONS, THREE, "--near=0,0")

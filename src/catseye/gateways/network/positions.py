@@ -19,9 +19,9 @@ def positions_passages(located: LocatedTargets) -> list[Passage]:
     found, total = int(located.found.sum()), len(located.found)
     text = f"{found} of {counted(total, 'target')} found"
     if found:
-        u = np.sqrt(np.einsum("nii->n", located.positions.covariance[located.found]) / 3.0)
+        u = np.sqrt(np.diagonal(located.positions.covariance[located.found], axis1=1, axis2=2))
         usual, worst = quantity(float(np.median(u)), "m"), quantity(float(u.max()), "m")
-        text += f"; a coordinate is usually known to {usual}, of the worst to {worst} (1σ)"
+        text += f"; a coordinate is usually known to {usual}, the worst to {worst} (1σ)"
     first = np.flatnonzero(~located.found)
     failure = f"first target {located.target_names[first[0]]}: {located.words[first[0]]}." if len(first) else ""
     return [

@@ -175,6 +175,7 @@ def located(
     both: bool = False,
     averaging: bool = False,
     u_stations: np.ndarray | None = None,
+    names: tuple[tuple[str, ...], tuple[str, ...]] | None = None,
 ) -> LocatedTargets:
     """Targets located by least squares, or by the notes' iteration.
 
@@ -185,6 +186,7 @@ def located(
     both         True: the mirror image in the plane of its stations, too, where the ranges do not exclude it
     averaging    True: the notes' iteration, for targets of three ranges; it begins at `near`
     u_stations   m, standard uncertainties of the stations' coordinates: a number, (n,) or (n, 3)
+    names        of the stations and of the targets; None: their numbers
 
     A station's error moves each of its ranges by e.ds: for one target the same as errors of the ranges, u^2 = sigma^2
     + e'Ue, which weights, covariance and test then hold. Between targets it is common, which is not told here.
@@ -198,10 +200,10 @@ def located(
     sides = None if near is None else np.asarray(near, dtype=float)
     if averaging:
         assert sides is not None
-        return _averaged(stations, ranges, np.broadcast_to(each, ranges.shape), near=sides, both=both)
+        return _averaged(stations, ranges, np.broadcast_to(each, ranges.shape), near=sides, both=both, names=names)
     if not both:
         answer = positions(stations, ranges, each, near=sides)
-        return LocatedTargets(answer, stations, ranges, np.broadcast_to(each, ranges.shape))
+        return LocatedTargets(answer, stations, ranges, np.broadcast_to(each, ranges.shape), names=names)
     centre, normal = _planes(stations, ranges)
     above = centre + _sign(normal, None if sides is None else sides - centre)[:, None] * normal
     answer, other = (positions(stations, ranges, each, near=side) for side in (above, 2.0 * centre - above))
@@ -209,7 +211,7 @@ def located(
     size = np.ptp(stations, axis=0).max()
     second = replace(other, x=np.where((apart > SAME * size)[:, None], other.x, np.nan))
     second = replace(second, covariance=np.where(np.isfinite(second.x)[:, :, None], other.covariance, np.nan))
-    return LocatedTargets(answer, stations, ranges, np.broadcast_to(each, ranges.shape), other=second)
+    return LocatedTargets(answer, stations, ranges, np.broadcast_to(each, ranges.shape), other=second, names=names)
 
 
 def _with_stations(stations: np.ndarray, x: np.ndarray, sigma: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -245,15 +247,21 @@ def _sign(normal: np.ndarray, arm: np.ndarray | None) -> np.ndarray:
 
 
 def _averaged(
-    stations: np.ndarray, ranges: np.ndarray, sigma: np.ndarray, *, near: np.ndarray, both: bool
+    stations: np.ndarray,
+    ranges: np.ndarray,
+    sigma: np.ndarray,
+    *,
+    near: np.ndarray,
+    both: bool,
+    names: tuple[tuple[str, ...], tuple[str, ...]] | None,
 ) -> LocatedTargets:
     """Targets of three ranges, by the notes' iteration from a point near each."""
     measured = np.isfinite(ranges)
     many = np.flatnonzero(measured.sum(axis=1) > 3)
     if len(many):
-        count = int(measured[many[0]].sum())
+        count, target = int(measured[many[0]].sum()), str(many[0]) if names is None else names[1][many[0]]
         raise InputError(
-            f"method averaging: target {many[0]} has {count} ranges (expected 3: eq. 3.7 takes no more; "
+            f"method averaging: target {target} has {count} ranges (expected 3: eq. 3.7 takes no more; "
             "least_squares takes all)"
         )
     near = np.broadcast_to(near, (len(ranges), 3))
@@ -263,7 +271,7 @@ def _averaged(
         centre, normal = _planes(stations, ranges)
         mirrored = near - 2.0 * np.sum((near - centre) * normal, axis=1)[:, None] * normal
         other, _ = _averaged_side(stations, ranges, sigma, mirrored)
-    return LocatedTargets(answer, stations, ranges, sigma, other=other, iteration=iteration)
+    return LocatedTargets(answer, stations, ranges, sigma, other=other, iteration=iteration, names=names)
 
 
 def _averaged_side(
