@@ -85,3 +85,16 @@ def test_humidity_typed_as_a_fraction_is_refused_with_both_readings(few_01):
     weather = dataclasses.replace(few_01.weather, humidity_percent=0.01 * few_01.weather.humidity_percent)
     with pytest.raises(InputError, match=r"reads 0\.7\d+ %.* as a fraction it would be 7\d\.\d %.*WX2 likewise"):
         reduce_epoch(dataclasses.replace(few_01, weather=weather))
+
+
+def test_a_prism_far_off_the_others_surface_is_doubted(night_01, reduced_night_01):
+    """A radius typed for its height makes all its ranges 16.6 mm too long, and they agree with each other."""
+    assert reduced_night_01.surface.outlying == {}
+    prism = night_01.targets["DP022"]
+    half = {key: 0.5 * getattr(prism, key) for key in ("height_mm", "hrp_mm", "pc_mm")}
+    targets = {**night_01.targets, "DP022": prism.model_copy(update=half)}
+    reduction = reduce_epoch(dataclasses.replace(night_01, targets=targets))
+    assert list(reduction.surface.outlying) == ["DP022"]
+    assert reduction.verdict.word == "doubtful"
+    assert "DP022" in reduction.verdict.why
+    assert "height_mm" in reduction.verdict.why

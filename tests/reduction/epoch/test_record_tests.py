@@ -9,6 +9,7 @@ from catseye.constants import MILLIMETRE, PPM
 from catseye.estimation.least_squares.adjustment import adjust
 from catseye.reduction.epoch.contradictions.contradiction import RecordGroup
 from catseye.reduction.epoch.contradictions.hypotheses import DIRECTIONS, RecordKey, widened
+from catseye.reduction.epoch.contradictions.in_common import DATUM
 from catseye.reduction.epoch.coordinates import adjust_coordinates, settled_network
 from catseye.reduction.epoch.epoch import reduce_epoch
 from catseye.reduction.epoch.record_tests import EpochRecords, record_tests
@@ -134,6 +135,58 @@ def test_two_monuments_are_two_contradictions(few_01, reduced_few_01):
         (place,) = (e for e in contradiction.explanations if e.group is RecordGroup.MONUMENTS)
         east = place.errors[place.parts.index("east")]
         assert east == pytest.approx(2.0, abs=4.0 * place.u[place.parts.index("east")] + 0.1)
+
+
+def with_zeros(campaign, chosen):
+    mirrors = {
+        zp: m.model_copy(update={"d0_mm": m.d0_mm + 0.3}) if chosen(f"ZY{zp[2:]}") else m
+        for zp, m in campaign.mirrors.items()
+    }
+    return replace(campaign, mirrors=mirrors)
+
+
+def with_certificates(campaign, change):
+    marks = [
+        m.model_copy(update={"certified_distance_mm": change(m.certified_distance_mm)}) for m in campaign.benchmarks
+    ]
+    return replace(campaign, benchmarks=tuple(marks))
+
+
+def with_survey(campaign, scale):
+    """Scaled about the site's middle, with heights as they were."""
+    surveyed = {
+        n: m.model_copy(update={"x_mm": m.x_mm * scale, "y_mm": m.y_mm * scale}) for n, m in campaign.monuments.items()
+    }
+    return replace(campaign, monuments=surveyed)
+
+
+@pytest.mark.parametrize(
+    ("of", "changed", "size"),
+    [
+        ("zeros of all rangers", lambda c: with_zeros(c, lambda _: True), 0.3),
+        ("zeros of all rangers on monuments", lambda c: with_zeros(c, lambda n: n in c.monuments), 0.3),
+        ("certificates of all benchmarks", lambda c: with_certificates(c, lambda mm: mm + 0.3), 0.3),
+        ("scale of all certificates", lambda c: with_certificates(c, lambda mm: mm * (1.0 + 5.0 * PPM)), 5.0),
+        ("scale of all monuments", lambda c: with_survey(c, 1.0 + 10.0 * PPM), 10.0),
+    ],
+)
+def test_an_error_that_many_records_share_is_one_contradiction(few_01, reduced_few_01, of, changed, size):
+    """A batch, a bench or a survey: named as such, not as several of its records, and within the claim."""
+    found = adjusted(changed(few_01), reduced_few_01)
+    first = found.contradictions[0].explanations[0]
+    assert (first.group, first.of) == (RecordGroup.COMMON, of)
+    assert abs(first.errors[0] - size) < 4.0 * first.u[0]
+    usual = reduced_few_01.coordinates
+    assert np.all(np.abs(found.x - usual.x) <= 3.0 * found.u)
+
+
+def test_the_datum_of_a_survey_is_unchecked_and_never_blamed(records):
+    """No range shows where a whole survey is, or where it points: only positions that somebody typed."""
+    rows, _ = record_tests(records)
+    datum = [row for row in rows if row.record.removesuffix(" alike") in DATUM]
+    assert {row.record.removesuffix(" alike") for row in datum} == DATUM
+    assert all(row.unchecked for row in datum)
+    assert not [h for h in records.rivals if h.key.of in DATUM]
 
 
 def test_a_drifting_feed_arm_is_a_movement(few_01, reduced_few_01):

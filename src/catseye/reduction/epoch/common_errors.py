@@ -23,6 +23,7 @@ from catseye.estimation.least_squares.adjustment import LeastSquaresSolution
 from catseye.estimation.least_squares.covariance import Widened
 from catseye.estimation.least_squares.rows import ActiveRows
 from catseye.optics.glass import glass_named, temperature_slopes
+from catseye.reduction.epoch.contradictions.hypotheses import owners_of
 from catseye.reduction.epoch.prior_names import BENCHMARKS, GLASS, MONUMENTS, OFFSETS, TRIPLET_BALLS, ZEROS
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
 from catseye.reduction.epoch.unknowns import CampaignNetwork, path_ppm
@@ -182,7 +183,7 @@ def _of_glass(network: CampaignNetwork, parts: list[ShotParts], sights: list[_Si
     (prior,) = [prior for prior in network.priors if prior.name == GLASS] or (None,)
     if prior is None:
         return
-    owners = [network.layout.parameters[c].of for c in np.ravel(prior.columns).tolist()]
+    owners = [owner.of for owner in owners_of(prior, network.layout.parameters)]
     prisms = [name for name in owners if places[name].normal is not None]
     for first in range(0, len(prisms), BATCH):
         batch = np.isin(owners, prisms[first : first + BATCH])

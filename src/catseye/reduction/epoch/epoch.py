@@ -16,7 +16,7 @@ from catseye.reduction.epoch.motion.posture_by_ranges import posture_by_ranges
 from catseye.reduction.epoch.ranges import ElectronicsPhase, Phases, follow_electronics, measure_phases, walk_notes
 from catseye.reduction.epoch.reason import Reason, ShotStatus
 from catseye.reduction.epoch.settings import ReductionSettings
-from catseye.reduction.epoch.surface import DishFit, fit_surface, surface_notes
+from catseye.reduction.epoch.surface import DishFit, fit_surface, surface_doubts, surface_notes
 from catseye.reduction.epoch.telescope_track import at_middle_posture
 from catseye.reduction.epoch.verdict import campaign_verdict
 from catseye.reduction.site.places import sheet_notes
@@ -104,6 +104,7 @@ def reduce_epoch(
         refuse_fatal(posture_by_ranges(campaign, phases, electronics))
         coordinates = adjusted(campaign, phases, electronics, settings=settings, progress=progress)
         surface, missing = fit_surface(campaign, coordinates)
+        coordinates = replace(coordinates, doubts=(*coordinates.doubts, *surface_doubts(surface)))
         remainder = _third_order(typed, coordinates, settings)
     reasons = {k: reason for k, reason in enumerate(phases.reason) if reason} | wrong | coordinates.unresolved
     ranges = coordinates.ranges
@@ -132,6 +133,7 @@ def reduce_epoch(
         *dew_risk(campaign, surface_minus_air_c=settings.surface_minus_air_c).notes,
         *([missing] if missing else []),
         *surface_notes(surface),
+        *surface_doubts(surface),
     ]
     return Reduction(
         campaign=campaign,

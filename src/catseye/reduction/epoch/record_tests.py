@@ -38,9 +38,9 @@ from catseye.reduction.epoch.contradictions.hypotheses import (
     frequency_texts,
     line_hypothesis,
     patterns_of,
-    prior_hypotheses,
     range_hypotheses,
 )
+from catseye.reduction.epoch.contradictions.in_common import DATUM, prior_hypotheses
 from catseye.reduction.epoch.parameter import XYZ, ParameterKind
 from catseye.reduction.epoch.prior_names import APPROXIMATE
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
@@ -83,9 +83,10 @@ class EpochRecords:
 
     @cached_property
     def of_priors(self) -> list[Hypothesis]:
-        """Hypotheses of records with priors."""
+        """Hypotheses of records with priors; in a live epoch each alone, as seconds show nothing in common."""
         network = self.network
-        return prior_hypotheses(network.priors, network.layout.parameters, network.campaign, network.places)
+        each = prior_hypotheses(network.priors, network.layout.parameters, network.campaign, network.places)
+        return [h for h in each if network.motion is None or h.key.group is not RecordGroup.COMMON]
 
     @cached_property
     def of_ranges(self) -> list[Hypothesis]:
@@ -118,9 +119,10 @@ class EpochRecords:
         """Hypotheses compared with wrong shots while these are searched for.
 
         Records of one number each are compared where they stand out, and not those that the allowance has released
-        or keeps.
+        or keeps; nor a survey's datum, which no range shows.
         """
-        return [h for h in (*self.of_priors, *self.of_ranges) if not self._settled(h)]
+        each = (*self.of_priors, *self.of_ranges)
+        return [h for h in each if h.key.of not in DATUM and not self._settled(h)]
 
     def _settled(self, hypothesis: Hypothesis) -> bool:
         group, of = hypothesis.key

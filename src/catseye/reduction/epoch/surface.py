@@ -3,14 +3,16 @@
 The pose is relative to the nominal posture.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TypedDict
 
 import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid
+from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid, place_paraboloid
+from catseye.geometry.frames.frame import Transform
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
 from catseye.reduction.epoch.dish import dish_prisms
@@ -18,6 +20,11 @@ from catseye.reduction.epoch.lines.cycles import MANY
 from catseye.reduction.site.places import nominal_frame
 
 FEWEST_LINES = 3  # that place a prism
+FEWEST_PRISMS = 12  # of which one can stand out, twice what the fit needs
+OUTLYING = 10.0  # times the other prisms' scatter about the paraboloid,
+OUTLYING_M = 3e-3  # and at least, chosen: panels are set to fractions of a millimetre, a half wavelength is 100 mm
+TRIMMED, TRIMS = 4.0, 10  # times the scatter from which a prism does not place the paraboloid; cap of rounds
+NORMAL_SCATTER = 1.4826  # standard deviation over the median magnitude of a normal distribution
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
 
 
@@ -49,6 +56,7 @@ class DishFit:
     pivot          (3,) m, ground frame: the nominal vertex, about which the rotation turns
     unchecked      prisms of these that an error of one of their lines would move unseen; () where there are enough
                    others
+    outlying       prism: m, deviation from the paraboloid of the others, which scatter by far less
     """
 
     names: tuple[str, ...]
@@ -56,6 +64,7 @@ class DishFit:
     focal_length: float
     pivot: np.ndarray
     unchecked: tuple[str, ...] = ()
+    outlying: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def rms(self) -> float:
@@ -121,7 +130,41 @@ def _fit(
     except EstimationError as problem:
         return None, f"no paraboloid: {problem}"
     unchecked = tuple(name for name in names if name in coordinates.unchecked)
-    return DishFit(names, fit, focal_length, nominal.translation, unchecked), ""
+    outlying = _outlying(names, coordinates.x[rows], nominal, focal_length=focal_length)
+    return DishFit(names, fit, focal_length, nominal.translation, unchecked, outlying), ""
+
+
+def _outlying(
+    names: tuple[str, ...], points: np.ndarray, nominal: Transform, *, focal_length: float
+) -> dict[str, float]:
+    """Deviations, m, of prisms that stand far off the paraboloid through all that do not."""
+    if len(names) < FEWEST_PRISMS:
+        return {}
+    weights = np.ones(len(names))
+    for _ in range(TRIMS):
+        try:
+            placed = place_paraboloid(points, nominal, focal_length=focal_length, weights=weights)
+        except EstimationError:
+            return {}
+        size, before = np.abs(placed.deviation), weights
+        scatter = NORMAL_SCATTER * float(np.median(size[weights > 0.0]))
+        weights = (size <= TRIMMED * scatter).astype(float)
+        if np.array_equal(weights, before):
+            break
+    far = np.flatnonzero(size > max(OUTLYING * scatter, OUTLYING_M))
+    return {names[k]: float(placed.deviation[k]) for k in far.tolist()}
+
+
+def surface_doubts(surface: DishFit | None) -> list[str]:
+    """Prisms that are far off the surface of the others: a wrong sheet or cycle moves a prism so, along its lines."""
+    if surface is None or not surface.outlying:
+        return []
+    some = ", ".join(f"{n} by {d / MILLIMETRE:+.1f} mm" for n, d in list(surface.outlying.items())[:MANY])
+    more = f" and {len(surface.outlying) - MANY} more" if len(surface.outlying) > MANY else ""
+    return [
+        f"prisms stand far off the paraboloid of the others: {some}{more}: see their height_mm, their typed positions "
+        "and their panels; the ranges of one place alone do not decide"
+    ]
 
 
 def surface_notes(surface: DishFit | None) -> list[str]:

@@ -20,15 +20,15 @@ from catseye.reduction.epoch.air.field import AirField
 from catseye.reduction.epoch.allowance import NOTHING, Allowance
 from catseye.reduction.epoch.contradictions.contradiction import RecordGroup
 from catseye.reduction.epoch.contradictions.hypotheses import (
+    DIRECTIONS,
     EVERYTHING,
     RecordKey,
     is_parameter,
     parameter_of,
-    parts_of,
-    prior_hypotheses,
     widened,
     with_error,
 )
+from catseye.reduction.epoch.contradictions.in_common import prior_hypotheses
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.motion.telescope_motion import PARTS, TelescopeKnots
 from catseye.reduction.epoch.parameter import AIR_KINDS, POINT_KINDS, XYZ, Parameter, ParameterKind
@@ -339,10 +339,9 @@ def _add_head(layout: UnknownsLayout, campaign: ObservedSite, name: str) -> None
 
 def _add_errors(layout: UnknownsLayout, allowance: Allowance) -> None:
     """Add parameters of contradicted records without priors, in place."""
-    for key in allowance.errors:
+    for key, sigma in allowance.errors.items():
         if is_parameter(key):
-            parts = parts_of(key.group)
-            layout.add(parameter_of(key), parts, np.zeros(len(parts)))
+            layout.add(parameter_of(key), DIRECTIONS if len(sigma) > 1 else ("",), np.zeros(len(sigma)))
 
 
 def middle_of(mjd_utc: np.ndarray) -> float:
@@ -524,12 +523,12 @@ def _widened(
         return priors
     result = [_beyond_limits(prior, layout, allowance) if prior.name == LIMITS else prior for prior in priors]
     for hypothesis in prior_hypotheses(priors, layout.parameters, campaign, places):
-        sigma = allowance.errors.get(hypothesis.key)
-        for i, rows in hypothesis.priors.items() if sigma is not None else ():
+        sigma = np.array(allowance.errors.get(hypothesis.key, ()))
+        for i, rows in hypothesis.priors.items() if len(sigma) else ():
             if is_parameter(hypothesis.key):
-                result[i] = with_error(result[i], rows, layout.columns(parameter_of(hypothesis.key), 1))
+                result[i] = with_error(result[i], rows, layout.columns(parameter_of(hypothesis.key), len(sigma)))
             else:
-                result[i] = widened(result[i], rows, np.array(sigma))
+                result[i] = widened(result[i], rows, sigma)
     return result
 
 

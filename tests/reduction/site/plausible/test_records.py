@@ -113,6 +113,26 @@ def test_a_certificate_in_another_unit_is_left_out(night_01, factor, unit):
     assert campaign.benchmarks == tuple(others)
 
 
+def test_exchanged_certificates_are_left_out(night_01):
+    """Each is 15 m and more from its ends' coordinates, and is the other's."""
+    a, b, *others = night_01.benchmarks
+    swapped = [
+        one.model_copy(update={"certified_distance_mm": other.certified_distance_mm}) for one, other in ((a, b), (b, a))
+    ]
+    campaign, found = plausible_campaign(dataclasses.replace(night_01, benchmarks=(*swapped, *others)))
+    assert campaign.benchmarks == tuple(others)
+    for record, other in zip(found, (b, a), strict=True):
+        assert f"looks like that of {other.target}; left out" in record.text
+
+
+def test_a_certificate_off_by_metres_is_left_out(night_01):
+    first, *others = night_01.benchmarks
+    longer = first.model_copy(update={"certified_distance_mm": first.certified_distance_mm + 400.0})
+    campaign, (found,) = plausible_campaign(dataclasses.replace(night_01, benchmarks=(longer, *others)))
+    assert campaign.benchmarks == tuple(others)
+    assert "undecided which is wrong" in found.text
+
+
 # Posture
 
 

@@ -320,12 +320,19 @@ class AirField:
         )
         temperature, pressure = state[k, :, 0], state[k, :, 1]
         ordinary = np.ptp(temperature) < ALIKE_C and temperature.max() < RARE_C and pressure.min() > LEAST_HPA
-        return f"weather.csv: at {mjd_utc[k]:.5f} the stations read {readings}: " + (
-            "ordinary air, but the ranges ask for air along a path beyond the limits of the index formula "
-            "(another record is wrong by many times its u, or many shots are: check surveys, typed positions, mirrors)"
-            if ordinary and np.all(np.abs(offsets) < MUCH_C)
-            else "along the paths these exceed the limits of the index formula (check these readings, or leave a "
-            "station out of site.toml and weather.csv)"
+        begin = f"at {mjd_utc[k]:.5f} the stations read {readings}: "
+        if ordinary and np.all(np.abs(offsets) < MUCH_C):
+            return (
+                f"weather.csv: {begin}ordinary air, but the ranges ask for air along a path beyond the limits of the "
+                "index formula (another record is wrong by many times its u, or many shots are: check surveys, typed "
+                "positions, mirrors)"
+            )
+        misled = [o for t, o in zip(temperature, offsets, strict=True) if abs(o) > MUCH_C and not _unit_of(t, o)]
+        where = "weather.csv or another record" if misled else "weather.csv"
+        others = ", and typed positions, frequency and zeros, with which the ranges fit no air" if misled else ""
+        return (
+            f"{where}: {begin}along the paths these exceed the limits of the index formula (check these "
+            f"readings{others}, or leave a station out of site.toml and weather.csv)"
         )
 
     def _by_thermometers(self, state: "_Weather", nodes: "_Nodes") -> tuple[np.ndarray, ...]:

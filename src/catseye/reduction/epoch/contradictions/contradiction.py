@@ -31,6 +31,7 @@ class RecordGroup(StrEnum):
     HEADS = "head effects"
     MOVEMENTS = "movements"  # of a body or a monument during the campaign: recorded as none
     LINES = "single lines"  # shots of one ranger on one target
+    COMMON = "errors in common"  # of many records: of one batch, one gauge, one survey
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,8 @@ class ShotLines:
 
 def is_parameter(key: RecordKey) -> bool:
     """True for an error that is a parameter: of a record without a prior, or one that many priors share."""
-    return key.group in WITHOUT_PRIOR or key == RecordKey(RecordGroup.TRIPLETS, EVERYTHING)
+    shared = RecordKey(RecordGroup.TRIPLETS, EVERYTHING), RecordKey(RecordGroup.COMMON, key.of)
+    return key.group in WITHOUT_PRIOR or key in shared
 
 
 def parameter_of(key: RecordKey) -> Parameter:
@@ -178,6 +179,13 @@ def slopes_of(key: RecordKey, sight: ShotLines) -> np.ndarray:
 def _belongs(of: str, name: str, body: str) -> bool:
     """True for a point of the body, of the telescope, or for the point itself."""
     return name == of or (of in BODIES and body == of) or (of == TELESCOPE and body != "")
+
+
+def owners_of(prior: ObservationGroup, parameters: Sequence[Parameter]) -> list[Parameter]:
+    """Parameter of each row of a prior of independent parameters, which errors in common may follow."""
+    assert isinstance(prior, Linear)
+    columns = prior.columns[: len(prior.observed)] if prior.columns.ndim == 1 else prior.columns[:, 0]
+    return [parameters[c] for c in columns.tolist()]
 
 
 def prior_hypotheses(
@@ -237,7 +245,7 @@ class _Listing:
     def _singles(self, i: int, prior: ObservationGroup) -> list[Hypothesis]:
         group, record, where = SINGLES[prior.name]
         result = []
-        for k, parameter in enumerate(self.parameters[c] for c in np.ravel(prior.columns).tolist()):
+        for k, parameter in enumerate(owners_of(prior, self.parameters)):
             of = str(parameter) if group is RecordGroup.HEADS else parameter.of
             sheet = self.campaign.mirror_of(parameter.of).zp if "{sheet}" in where else ""
             text = record.format(of=parameter.of, part=parameter.part, parameter=parameter)
@@ -248,7 +256,7 @@ class _Listing:
 
     def _monuments(self, i: int, prior: ObservationGroup) -> list[Hypothesis]:
         rows: dict[str, list[int]] = {}
-        owners = [self.parameters[c] for c in np.ravel(prior.columns).tolist()]
+        owners = owners_of(prior, self.parameters)
         for k, owner in enumerate(owners):
             rows.setdefault(owner.of, []).append(k)
         result = []
@@ -354,6 +362,8 @@ def patterns_of(
 ) -> Patterns:
     """Patterns of hypotheses in stacked observations, rangers' groups first.
 
+    The rows of an error in common are kept: without a whole survey nothing holds the points.
+
     counts   rows of each group, sights' and priors'
     active   (rows,) bool
     """
@@ -368,22 +378,29 @@ def patterns_of(
             for low, sight in zip(first, sights, strict=False):
                 vector[low : low + len(sight.targets)] = slopes_of(h.key, sight)
         vectors.append(np.where(active[:, None], vector, 0.0))
-        stated_rows.append(np.concatenate([np.zeros(0, dtype=int), *stated]))
+        leavable = [] if h.key.group is RecordGroup.COMMON else stated
+        stated_rows.append(np.concatenate([np.zeros(0, dtype=int), *leavable]))
     return Patterns.of(vectors, int(first[-1]), stated_rows)
 
 
 def with_error(prior: ObservationGroup, rows: PriorRows, column: np.ndarray) -> ObservationGroup:
-    """Prior whose record may err by a parameter that others share.
+    """Prior whose record may err by parameters that others share.
 
-    rows     of it, and their change by the error
-    column   (1,) of the parameter
+    rows     of it, and their change by the k errors
+    column   (k,) of the parameters
     """
-    assert isinstance(prior, Linear)
-    assert prior.columns.ndim == 1
     at, change = rows
-    slope = np.zeros((len(prior.observed), 1))
+    slope = np.zeros((len(prior.observed), len(column)))
     slope[at] = change
-    return replace(prior, columns=np.concatenate([prior.columns, column]), matrix=np.hstack([prior.matrix, slope]))
+    spread = np.broadcast_to(column, slope.shape)
+    if isinstance(prior, Distances):
+        assert prior.nuisance is not None
+        coefficient = np.hstack([np.broadcast_to(prior.coefficient, prior.nuisance.shape), slope])
+        return replace(prior, nuisance=np.hstack([prior.nuisance, spread]), coefficient=coefficient)
+    assert isinstance(prior, Linear)
+    further = column if prior.columns.ndim == 1 else spread
+    columns = np.concatenate([prior.columns, further], axis=-1)
+    return replace(prior, columns=columns, matrix=np.hstack([prior.matrix, slope]))
 
 
 def widened(prior: ObservationGroup, rows: PriorRows, sigma: np.ndarray) -> ObservationGroup:

@@ -10,14 +10,14 @@ import numpy as np
 from catseye.constants import DEGREE, MILLIMETRE
 from catseye.records.night.campaign import Campaign
 from catseye.records.site.target import TargetRow
-from catseye.reduction.site.plausible.record import ImplausibleRecord
+from catseye.reduction.site.plausible.record import ImplausibleRecord, listed
 
 MERIDIAN_RADIUS_M = 6.3674e6  # mean of the meridian's, 6.335e6 at the equator to 6.400e6 at the pole: GRS 80
 USUAL_LATITUDE_M, USUAL_HEIGHT_M = 30.0, 10.0  # chosen: a handheld receiver's place, and the geoid's under a site
 STANDS_OUT = 10.0  # times the other monuments' scatter
 FEWEST = 4  # monuments of which one can stand out
 FAR_NORTH_DEG = 0.5  # chosen: 56 km from the site's latitude to its monuments'
-OFF_DISH_M = 0.3  # chosen: twenty times the usual error of a typed position, 15 mm
+OFF_DISH_M = OFF_ENDS_M = 0.3  # chosen: twenty times the usual error of a typed position, 15 mm
 UNITS_MM = {"metres": 1e3, "centimetres": 10.0, "inches": 25.4, "feet": 304.8, "micrometres": 1e-3}
 NEAR = 0.01  # relative tolerance of a unit's factor
 MANY = 0.5  # share of the dish's prisms beyond which the list or the paraboloid is wrong as a whole
@@ -164,21 +164,26 @@ def _all_in(dish: list[TargetRow], focal_length_mm: float) -> str:
 
 
 def _certificates(campaign: Campaign) -> tuple[Campaign, list[ImplausibleRecord]]:
-    """Certified distances that are their ends' in another unit."""
+    """Certified distances that are not their ends': in another unit, of another benchmark, or the ends' are wrong."""
     from catseye.reduction.site.places import places_of
 
     if not campaign.benchmarks:
         return campaign, []
     places, implausible, right = places_of(campaign), [], []
-    for mark in campaign.benchmarks:
-        length = float(np.linalg.norm(places[mark.ranger].start - places[mark.target].start))
-        unit = other_unit(mark.certified_distance_mm * MILLIMETRE, length)
-        if not unit:
+    typed = [float(np.linalg.norm(places[m.ranger].start - places[m.target].start)) for m in campaign.benchmarks]
+    for mark, length in zip(campaign.benchmarks, typed, strict=True):
+        certified = mark.certified_distance_mm * MILLIMETRE
+        unit = other_unit(certified, length)
+        ends = zip(campaign.benchmarks, typed, strict=True)
+        alike = tuple(m.target for m, own in ends if m is not mark and abs(own - certified) <= OFF_ENDS_M)
+        if not unit and abs(certified - length) <= OFF_ENDS_M:
             right.append(mark)
             continue
+        guess = f"looks like {unit}" if unit else f"looks like that of {listed(alike)}" if alike else ""
+        guess = guess or "typed distance and coordinates disagree, undecided which is wrong"
         text = (
             f"{mark.ranger} - {mark.target} is {mark.certified_distance_mm:g} mm where the coordinates give "
-            f"{length / MILLIMETRE:.0f} mm: looks like {unit}; left out"
+            f"{length / MILLIMETRE:.0f} mm: {guess}; left out"
         )
         implausible.append(
             ImplausibleRecord("benchmarks.csv: certified_distance_mm", text, "certificate", (mark.ranger, mark.target))
