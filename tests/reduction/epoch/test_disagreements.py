@@ -98,3 +98,21 @@ def test_a_prism_far_off_the_others_surface_is_doubted(night_01, reduced_night_0
     assert reduction.verdict.word == "doubtful"
     assert "DP022" in reduction.verdict.why
     assert "height_mm" in reduction.verdict.why
+
+
+def test_a_focal_length_20_mm_long_is_noted(night_01, reduced_night_01):
+    assert reduced_night_01.surface.other_focus == 0.0
+    design = night_01.site.paraboloid
+    longer = design.model_copy(update={"focal_length_mm": design.focal_length_mm + 20.0})
+    site = night_01.site.model_copy(update={"paraboloid": longer})
+    reduction = reduce_epoch(dataclasses.replace(night_01, site=site))
+    assert any("focal_length_mm" in note for note in reduction.notes)
+    assert abs(1e3 * reduction.surface.other_focus - design.focal_length_mm) < 5.0
+
+
+def test_a_scale_that_leans_accuses_no_thermometer_alone(few_01):
+    """Light of 0.850 um in the record, not 0.780, is a scale: one of several explanations, within the claim."""
+    ranging = few_01.site.ranging.model_copy(update={"wavelength_um": 0.850})
+    site = few_01.site.model_copy(update={"ranging": ranging})
+    reduction = reduce_epoch(dataclasses.replace(few_01, site=site))
+    assert not any("thermometer is biased" in doubt for doubt in reduction.coordinates.doubts)

@@ -59,6 +59,7 @@ LARGEST = {  # errors beyond which an explanation is impossible, in the unit of 
     RecordGroup.MODULATION: 100.0,  # ppm: a quartz without an oven is good to 50
     RecordGroup.PRESSURE: 150.0,  # hPa: station pressure and sea level's differ by so much up to 1300 m
     RecordGroup.HUMIDITY: 100.0,
+    RecordGroup.GLASS: 20.0,  # mm: half a prism's, a radius typed for a height
     RecordGroup.LEAKAGE: 200.0,  # mV: a tenth of a usual return
     RecordGroup.MOVEMENTS: 20.0,  # mm/h: a telescope that is driven moves faster, pillars and steel do not
 }

@@ -11,7 +11,7 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.paraboloid import ParaboloidFit, fit_paraboloid, place_paraboloid
+from catseye.estimation.shapes.paraboloid import POSE, ParaboloidFit, fit_paraboloid, place_paraboloid
 from catseye.geometry.frames.frame import Transform
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
@@ -23,6 +23,7 @@ FEWEST_LINES = 3  # that place a prism
 FEWEST_PRISMS = 12  # of which one can stand out, twice what the fit needs
 OUTLYING = 10.0  # times the other prisms' scatter about the paraboloid,
 OUTLYING_M = 3e-3  # and at least, chosen: panels are set to fractions of a millimetre, a half wavelength is 100 mm
+OTHER_FOCUS, OTHER_FOCUS_M = 2.0, 4e-4  # times the rms with a free focal length, and at least: above a set surface's
 TRIMMED, TRIMS = 4.0, 10  # times the scatter from which a prism does not place the paraboloid; cap of rounds
 NORMAL_SCATTER = 1.4826  # standard deviation over the median magnitude of a normal distribution
 UNOBSERVED = "rotation about the dish's own axis: a paraboloid does not show it"
@@ -57,6 +58,7 @@ class DishFit:
     unchecked      prisms of these that an error of one of their lines would move unseen; () where there are enough
                    others
     outlying       prism: m, deviation from the paraboloid of the others, which scatter by far less
+    other_focus    m, focal length that the prisms fit far better than the design; 0 without
     """
 
     names: tuple[str, ...]
@@ -65,6 +67,7 @@ class DishFit:
     pivot: np.ndarray
     unchecked: tuple[str, ...] = ()
     outlying: Mapping[str, float] = field(default_factory=dict)
+    other_focus: float = 0.0
 
     @property
     def rms(self) -> float:
@@ -131,7 +134,8 @@ def _fit(
         return None, f"no paraboloid: {problem}"
     unchecked = tuple(name for name in names if name in coordinates.unchecked)
     outlying = _outlying(names, coordinates.x[rows], nominal, focal_length=focal_length)
-    return DishFit(names, fit, focal_length, nominal.translation, unchecked, outlying), ""
+    other = 0.0 if outlying else _other_focus(coordinates.x[rows], fit, nominal)
+    return DishFit(names, fit, focal_length, nominal.translation, unchecked, outlying, other), ""
 
 
 def _outlying(
@@ -155,8 +159,20 @@ def _outlying(
     return {names[k]: float(placed.deviation[k]) for k in far.tolist()}
 
 
+def _other_focus(points: np.ndarray, fit: ParaboloidFit, nominal: Transform) -> float:
+    """Focal length, m, of a paraboloid from which prisms depart far less than from the design; 0 without."""
+    rms = float(np.sqrt(np.mean(fit.deviation**2)))
+    if len(points) < FEWEST_PRISMS or rms < OTHER_FOCUS_M:
+        return 0.0
+    try:
+        free = place_paraboloid(points, nominal, focal_length=fit.focal_length, free=(*POSE, "focal-length"))
+    except EstimationError:
+        return 0.0
+    return free.focal_length if rms > OTHER_FOCUS * float(np.sqrt(np.mean(free.deviation**2))) else 0.0
+
+
 def surface_doubts(surface: DishFit | None) -> list[str]:
-    """Prisms that are far off the surface of the others: a wrong sheet or cycle moves a prism so, along its lines."""
+    """Prisms far off the surface of the others: a wrong sheet moves one so, along its lines."""
     if surface is None or not surface.outlying:
         return []
     some = ", ".join(f"{n} by {d / MILLIMETRE:+.1f} mm" for n, d in list(surface.outlying.items())[:MANY])
@@ -168,11 +184,20 @@ def surface_doubts(surface: DishFit | None) -> list[str]:
 
 
 def surface_notes(surface: DishFit | None) -> list[str]:
-    """Note on prisms of surface and pose that nothing checks."""
-    if surface is None or not surface.unchecked:
+    """Notes on a focal length that fits better, and on prisms of surface and pose that nothing checks."""
+    if surface is None:
         return []
-    some = ", ".join(surface.unchecked[:MANY]) + " ..." * (len(surface.unchecked) > MANY)
-    return [
-        f"surface and pose depend on {len(surface.unchecked)} of {len(surface.names)} prisms whose lines do not check "
-        f"each other: {some}"
-    ]
+    notes = []
+    if surface.other_focus:
+        notes.append(
+            f"the prisms fit a focal length of {surface.other_focus / MILLIMETRE:.1f} mm {OTHER_FOCUS:g} times as well "
+            f"as the design's {surface.focal_length / MILLIMETRE:.1f} mm, or better: see focal_length_mm in "
+            "site.toml; vertex and axis belong to the design's"
+        )
+    if surface.unchecked:
+        some = ", ".join(surface.unchecked[:MANY]) + " ..." * (len(surface.unchecked) > MANY)
+        notes.append(
+            f"surface and pose depend on {len(surface.unchecked)} of {len(surface.names)} prisms whose lines do not "
+            f"check each other: {some}"
+        )
+    return notes
