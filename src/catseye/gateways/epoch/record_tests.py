@@ -268,12 +268,16 @@ def checks_sentences(coordinates: AdjustedCoordinates) -> list[str]:
         sentences.append(f"By class of points: {', '.join(map(_class_words, coordinates.scatter))}.")
     if coordinates.unchecked:
         sentences.append(f"Unchecked, as an error of one line could move them unseen: {some(coordinates.unchecked)}.")
-    common = [test for test in coordinates.records if test.unchecked and test.record.endswith(" alike")]
-    sentences += [
-        f"Nothing else measures {test.record}: an error below {test.detectable:.2g} {test.unit}, "
-        f"{test.detectable / test.u:.0f} of its u, would not show."
-        for test in common
-    ]
+    hidden = {}
+    for test in sorted(coordinates.records, key=lambda t: t.detectable):
+        if test.unchecked and test.record.endswith(" alike"):  # of several parts the least known
+            size = f"{test.detectable:.2g} {test.unit}" if np.isfinite(test.detectable) else "any size"
+            hidden[test.record.removesuffix(" alike")] = size
+    if hidden:
+        sizes = "; ".join(f"{record} by {size}" for record, size in hidden.items())
+        sentences.append(
+            f"Nothing else measures these alike, so that smaller errors in common would not show: {sizes}."
+        )
     if coordinates.unmeasured:
         sentences.append(f"Not measured: {some(coordinates.unmeasured)}.")
     return sentences
