@@ -222,9 +222,8 @@ def doubts_of(
     air = network.field
     sigmas = network.allowance.sigmas(air)
     named = {*refuted, *(reason.subject for reason in network.allowance.reasons)}
-    if any(
-        key.group is RecordGroup.THERMOMETERS for key in network.allowance.errors
-    ):  # each is one of several explanations, and those that are not follow the one that is
+    # where one is one of several explanations, the others follow it
+    if any(key.group is RecordGroup.THERMOMETERS for key in network.allowance.errors):
         named |= {Parameter(ParameterKind.THERMOMETER, station) for station in air.stations}
     for station, column, sigma in zip(air.stations, network.layout.air, sigmas, strict=False):
         value = float(solution.x[column])

@@ -40,7 +40,7 @@ from catseye.reduction.epoch.contradictions.hypotheses import (
     patterns_of,
     range_hypotheses,
 )
-from catseye.reduction.epoch.contradictions.in_common import DATUM, prior_hypotheses
+from catseye.reduction.epoch.contradictions.in_common import DATUM, record_hypotheses
 from catseye.reduction.epoch.parameter import XYZ, ParameterKind
 from catseye.reduction.epoch.prior_names import APPROXIMATE
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
@@ -86,7 +86,7 @@ class EpochRecords:
     def of_priors(self) -> list[Hypothesis]:
         """Hypotheses of records with priors; in a live epoch each alone, as seconds show nothing in common."""
         network = self.network
-        each = prior_hypotheses(network.priors, network.layout.parameters, network.campaign, network.places)
+        each = record_hypotheses(network.priors, network.layout.parameters, network.campaign, network.places)
         return [h for h in each if network.motion is None or h.key.group is not RecordGroup.COMMON]
 
     @cached_property

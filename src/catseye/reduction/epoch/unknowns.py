@@ -28,7 +28,7 @@ from catseye.reduction.epoch.contradictions.hypotheses import (
     widened,
     with_error,
 )
-from catseye.reduction.epoch.contradictions.in_common import prior_hypotheses
+from catseye.reduction.epoch.contradictions.in_common import record_hypotheses
 from catseye.reduction.epoch.head import head_unknowns
 from catseye.reduction.epoch.motion.telescope_motion import PARTS, TelescopeKnots
 from catseye.reduction.epoch.parameter import AIR_KINDS, POINT_KINDS, XYZ, Parameter, ParameterKind
@@ -522,7 +522,7 @@ def _widened(
     if not allowance.errors:
         return priors
     result = [_beyond_limits(prior, layout, allowance) if prior.name == LIMITS else prior for prior in priors]
-    for hypothesis in prior_hypotheses(priors, layout.parameters, campaign, places):
+    for hypothesis in record_hypotheses(priors, layout.parameters, campaign, places):
         sigma = np.array(allowance.errors.get(hypothesis.key, ()))
         for i, rows in hypothesis.priors.items() if len(sigma) else ():
             if is_parameter(hypothesis.key):

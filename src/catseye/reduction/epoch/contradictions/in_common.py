@@ -18,8 +18,8 @@ from catseye.reduction.epoch.contradictions.hypotheses import (
     PriorRows,
     RecordKey,
     owners_of,
+    prior_hypotheses,
 )
-from catseye.reduction.epoch.contradictions.hypotheses import prior_hypotheses as hypotheses_of_records
 from catseye.reduction.epoch.parameter import XYZ, Parameter
 from catseye.reduction.epoch.prior_names import BENCHMARKS, GLASS, MONUMENTS, OFFSETS, ZEROS
 from catseye.reduction.site.places import RangedPoint
@@ -30,7 +30,7 @@ PLACES, TURNS, HEIGHTS = "places of all monuments", "directions of all monuments
 DATUM = frozenset((PLACES, TURNS, HEIGHTS))  # only typed positions speak of them, and a posture moves these alike
 
 
-def prior_hypotheses(
+def record_hypotheses(
     priors: Sequence[ObservationGroup],
     parameters: Sequence[Parameter],
     campaign: ObservedSite,
@@ -38,7 +38,7 @@ def prior_hypotheses(
 ) -> list[Hypothesis]:
     """Hypotheses of the records that priors state, and of what many of them have in common."""
     return [
-        *hypotheses_of_records(priors, parameters, campaign, places),
+        *prior_hypotheses(priors, parameters, campaign, places),
         *_zeros(priors, parameters, campaign),
         *_surveys(priors, parameters),
         *_mirrors(priors),
