@@ -135,7 +135,16 @@ def _fit(
     unchecked = tuple(name for name in names if name in coordinates.unchecked)
     outlying = _outlying(names, coordinates.x[rows], nominal, focal_length=focal_length)
     other = 0.0 if outlying else _other_focus(coordinates.x[rows], fit, nominal)
-    return DishFit(names, fit, focal_length, nominal.translation, unchecked, outlying, other), ""
+    found = DishFit(
+        names=names,
+        fit=fit,
+        focal_length=focal_length,
+        pivot=nominal.translation,
+        unchecked=unchecked,
+        outlying=outlying,
+        other_focus=other,
+    )
+    return found, ""
 
 
 def _outlying(
