@@ -14,7 +14,7 @@ from repository import ROOT
 
 NOTEBOOKS = sorted((ROOT / "examples" / "notebooks").glob("*.ipynb"))
 SERVING = ("serve", "view")  # until Ctrl-C: tests/cli/live and tests/browser try them
-LONGEST = 60.0  # s that a line may take without having said so beforehand
+LONGEST = 60.0  # s of the processor that a line may take without having said so beforehand
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 
 

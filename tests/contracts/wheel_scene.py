@@ -10,7 +10,7 @@ from pathlib import Path
 from repository import ROOT
 
 RUNNER = """
-import json, sys, time
+import json, os, sys
 from contextlib import redirect_stdout
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
@@ -20,7 +20,7 @@ from catseye.cli.commands import main
 from catseye.cli.terminal import finish
 names = {}
 for kind, text in json.load(sys.stdin):
-    said, start = TextIOWrapper(BytesIO(), encoding='utf-8'), time.monotonic()
+    said, start = TextIOWrapper(BytesIO(), encoding='utf-8'), sum(os.times()[:4])
     with redirect_stdout(said):
         if kind == "python":
             exec(text, names)
@@ -30,7 +30,7 @@ for kind, text in json.load(sys.stdin):
             status = finish(main)
     said.flush()
     text = said.buffer.getvalue().decode()
-    print(json.dumps({"status": status, "said": text, "seconds": time.monotonic() - start}), flush=True)
+    print(json.dumps({"status": status, "said": text, "seconds": sum(os.times()[:4]) - start}), flush=True)
 """
 
 
@@ -50,7 +50,7 @@ def unpacked(wheel: Path, directory: Path) -> Path:
 
 
 def run_there(where: Path, pieces: list[tuple[str, str]], python: Path, site: Path) -> list[dict]:
-    """What each piece did, all in one process: exit status, what it said, how long it took.
+    """What each piece did, all in one process: exit status, what it said, seconds of the processor.
 
     where    directory that they run in
     pieces   ("python", source) or ("catseye", JSON list of a command line)
