@@ -34,7 +34,13 @@ def template_table(kind: CalibrationKind) -> str:
 
     kind   of calibration
     """
-    return ",".join([*kind.layout.required, *kind.layout.optional, *OF_EVERY_TABLE]) + "\n"
+    return ",".join(_columns(kind)) + "\n"
+
+
+def _columns(kind: CalibrationKind) -> dict[str, Within | None]:
+    """Bounds of each column of a table, once each, needed ones first: some kinds need what others may have."""
+    own = {**kind.layout.required, **kind.layout.optional}
+    return {**own, **{column: None for column in OF_EVERY_TABLE if column not in own}}
 
 
 def template_sheet(name: str, kind: CalibrationKind, example: tuple[str, ...]) -> str:
@@ -52,8 +58,7 @@ def template_sheet(name: str, kind: CalibrationKind, example: tuple[str, ...]) -
         "#",
         f"# Columns of the table; delete optional ones that were not read, and {TIME} and {LEFT_OUT} where not needed:",
     ]
-    columns = {**layout.required, **layout.optional, TIME: None, LEFT_OUT: None}
-    for column, bounds in columns.items():
+    for column, bounds in _columns(kind).items():
         need = "needed" if column in layout.required else "optional"
         lines.append(f"#   {column}: {_described(column, bounds)}{need}")
     lines += ["#", "# Example:", *(f"#   {row}" for row in example), "", f'kind = "{name}"']

@@ -164,6 +164,7 @@ def read_readings(path: Path | str, layout: SheetLayout, sheet: Path | str | Non
     folder = Folder(path.parent)
     text = folder.text(path.name)
     optional = {**layout.optional, TIME: Within(EARLIEST_MJD, LATEST_MJD), LEFT_OUT: TEXT}
+    optional = {name: bounds for name, bounds in optional.items() if name not in layout.required}
     table = columns_of(text, path.name, list(layout.required), optional=list(optional))
     limits = {**optional, **layout.required}
     numbers, words = {}, {}
