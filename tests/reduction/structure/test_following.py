@@ -163,3 +163,23 @@ def test_what_a_kind_needs_is_named(kind):
     series = VibrationSeries("arm.csv", kind, ("x_mm", "y_mm"), np.arange(64.0), np.ones((64, 4)))
     with pytest.raises(InputError, match=r"arm\.csv: .* need"):
         samples_of(series, slope=None, u_signal=None, u=None, window=0.0)
+
+
+@pytest.mark.parametrize("frequency", [0.8, 1.3])
+def test_a_swing_without_wind_along_a_slanted_line_keeps_its_amplitude_and_phase_on_both_axes(frequency):
+    """A line of slope 0.3, no damping: both axes are one mode, and the filter must not turn its line."""
+    t, u = np.arange(1600) / 20.0, 1e-5
+    turns = 2.0 * np.pi * frequency * t + 0.7
+    truth = np.array([1.5e-3, 0.45e-3])
+    noise = u * np.random.default_rng(9).standard_normal((len(t), 2))
+    samples = VibrationSamples(
+        ("x", "y"), t, np.cos(turns)[:, None] * truth + noise, np.tile(u**2 * np.eye(2), (1600, 1, 1))
+    )
+    found = follow_vibration(samples, ahead=0.15)
+    amplitude, u_amplitude = found.state.amplitudes()
+    phase, u_phase = found.state.phases()
+    assert np.all(np.abs(amplitude[0] - truth) < 3.5 * u_amplitude[0])
+    off = (phase[0] - turns[-1] + np.pi) % (2.0 * np.pi) - np.pi
+    assert np.all(np.abs(off) < 3.5 * u_phase[0])
+    assert found.verdict.word == "good"
+    assert found.ratio == pytest.approx(1.0, abs=0.1)

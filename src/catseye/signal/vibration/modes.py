@@ -17,6 +17,7 @@ SETTLED = 1e-3  # of a standard uncertainty, squared: the last step
 SLACK = 0.3  # of the samples' scatter: noise of the filter that removes a mode to find the next
 FREQUENCIES = 4000  # upper limit of the first search
 MOST_DAMPING = 0.5  # ratio, while searching
+DIRECTIONS = 2  # passes over the samples for the direction of each mode
 WIDE = 1e3  # times the largest sample: prior of an unknown offset
 
 
@@ -42,8 +43,9 @@ def find_modes(
 
     The likelihood is that of the Kalman filter (axes separate, offsets free, the force within a window taken as white),
     maximized by Fisher's scoring; the dampings have a wide prior, 1 % within a factor of 4.5, since a short series
-    hardly determines them. The covariance between axes comes from the filtered states, and increases the uncertainties
-    where axes move together. Raises EstimationError with too few samples or without convergence.
+    hardly determines them. The direction of each mode (ratio of axes, covariance between them) comes from the filtered
+    states; it increases the uncertainties where axes move together. Raises EstimationError with too few samples or
+    without convergence.
 
     Source: [SCHWEPPE65], the likelihood of innovations.
 
@@ -206,28 +208,44 @@ def _moves(w: Array, d: Array, step: float) -> Array:
 
 
 def _correlated(modes: tuple[Mode, ...], t: Array, y: Array, u_sample: float, window: float) -> tuple[Mode, ...]:
-    """Modes with the correlation between axes from their filtered states."""
+    """Modes with the direction of their motion from their filtered states, and their size as found.
+
+    The ratio of the axes must be that of the states: a mode that swings along one line has a correlation of 1, and with
+    it any other ratio would force its motion onto another line. The second pass knows the direction of the first.
+    """
     axes = y.shape[1]
     if axes == 1:
         return modes
+    turned = modes
+    for _ in range(DIRECTIONS):
+        squares = _mean_squares(turned, t, y, u_sample, window)
+        turned = tuple(
+            replace(mode, covariance=square * float(np.trace(mode.covariance) / np.trace(square)))
+            for mode, square in zip(modes, squares, strict=True)
+        )
+    correlated = []
+    for mode in turned:
+        size = np.sqrt(np.diag(mode.covariance))
+        correlation = mode.covariance / np.outer(size, size)
+        # axes taken as independent count shared information twice: use the variance of the scores
+        more = float(np.sqrt(np.sum(correlation**2) / axes))
+        correlated.append(replace(mode, u_frequency_hz=mode.u_frequency_hz * more, u_damping=mode.u_damping * more))
+    return tuple(correlated)
+
+
+def _mean_squares(modes: tuple[Mode, ...], t: Array, y: Array, u_sample: float, window: float) -> Array:
+    """Sums (m, A, A), m^2, over the second half of the samples, of the expected products of the axes' quadratures."""
+    axes = y.shape[1]
     state = start(float(t[0]) - 0.5 * window, modes, u_offset=WIDE * float(np.nanmax(np.abs(y))))
     sums = np.zeros((len(modes), axes, axes))
     for instant, sample in zip(t, y, strict=True):
         state = state.updated(float(instant), sample, np.eye(axes) * u_sample**2, window)[0]
         if instant > 0.5 * (t[0] + t[-1]):  # locked by then
-            z = state.quadratures()[0]
-            sums += np.einsum("mai,mbi->mab", z, z)
-    correlated = []
-    for mode, product in zip(modes, sums, strict=True):
-        size = np.sqrt(np.diag(product))
-        sigma = np.sqrt(np.diag(mode.covariance))
-        correlation = product / np.maximum(np.outer(size, size), np.finfo(float).tiny)
-        np.fill_diagonal(correlation, 1.0)
-        # axes taken as independent count shared information twice: use the variance of the scores
-        more = float(np.sqrt(np.sum(correlation**2) / axes))
-        spread = {"u_frequency_hz": mode.u_frequency_hz * more, "u_damping": mode.u_damping * more}
-        correlated.append(replace(mode, covariance=correlation * np.outer(sigma, sigma), **spread))
-    return tuple(correlated)
+            for k in range(len(modes)):
+                for first in (2 * axes * k, 2 * axes * k + axes):
+                    part = slice(first, first + axes)
+                    sums[k] += np.outer(state.mean[part], state.mean[part]) + state.covariance[part, part]
+    return sums
 
 
 def _peak(t: Array, y: Array) -> float:
