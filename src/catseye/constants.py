@@ -10,6 +10,7 @@ TWO_PI = 2.0 * math.pi
 DEGREE = math.pi / 180.0  # rad
 ARCSECOND = DEGREE / 3600.0  # rad
 MILLIMETRE = 1e-3  # m
+MILLIRADIAN = 1e-3  # rad
 PPM = 1e-6
 DRY_AIR_KG_PER_MOL = 28.9641e-3  # [CIDDOR96] appendix A, at 450 ppm of carbon dioxide
 WATER_OVER_AIR = 0.62198  # ratio of molar masses, [CIDDOR96] appendix A

@@ -1,11 +1,9 @@
-"""Figure of a calibration: readings and fit, residuals, and spectrum if present."""
+"""Figure of a calibration: readings and fit, and residuals, spectrum, noise of averages if present."""
 
 import numpy as np
 
 from catseye.gateways.writers.drawing import BAD, FAINT, SERIES, Figure, styled
 from catseye.reduction.calibrations.calibration import Calibration
-
-PANELS = {"residuals": "residual", "spectrum": "amplitude of residuals"}
 
 
 def calibration_figure(calibration: Calibration) -> Figure:
@@ -15,16 +13,13 @@ def calibration_figure(calibration: Calibration) -> Figure:
 
 
 def _drawn(calibration: Calibration) -> Figure:
-    below = [name for name in PANELS if name in calibration.curve]
+    below = [draw for name, draw in PANELS.items() if name in calibration.curve]
     heights = [2.0 if not calibration.equal_axes else 1.0, *([1.0] * len(below))]
     figure = Figure(figsize=(8.6, 5.6 if calibration.equal_axes else 2.6 * sum(heights) / 1.7), layout="constrained")
     panels = np.atleast_1d(figure.subplots(1 + len(below), 1, height_ratios=heights))
     _main(panels[0], calibration)
-    for name, ax in zip(below, panels[1:], strict=True):
-        if name == "residuals":
-            _residuals(ax, calibration)
-        else:
-            _spectrum(ax, calibration)
+    for draw, ax in zip(below, panels[1:], strict=True):
+        draw(ax, calibration)
     return figure
 
 
@@ -62,3 +57,14 @@ def _spectrum(ax, calibration: Calibration) -> None:
     ax.set_xlabel("period along the rail (mm)")
     ax.set_ylabel("amplitude of residuals (µm)")
     ax.set_ylim(bottom=0.0)
+
+
+def _averages(ax, calibration: Calibration) -> None:
+    number, deviation = calibration.curve["averages"]
+    ax.plot(number, deviation, "-o", ms=3.0, color=SERIES[0], mew=0, lw=0.9)
+    ax.set_xlabel("readings averaged")
+    ax.set_ylabel("Allan deviation (mrad)")
+    ax.set_ylim(bottom=0.0)
+
+
+PANELS = {"residuals": _residuals, "spectrum": _spectrum, "averages": _averages}

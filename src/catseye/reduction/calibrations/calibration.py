@@ -58,7 +58,7 @@ class Calibration:
     variance_factor, degrees_of_freedom   of the adjustment; NaN and 0 where nothing was redundant
     notes        for the user, one line each
     curve        for the figure: name -> (x, y) arrays; "readings" and "fit" at least; where they
-                 exist, "residuals" and "spectrum" are drawn below, "left out" among the readings
+                 exist, "residuals", "spectrum" and "averages" are drawn below, "left out" among the readings
     axes         labels of that figure
     method       method of the evaluation, in a few sentences for the certificate
     record       entries for the record of the quantities, by its keys: numbers or lists

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from catseye.constants import TWO_PI
+from catseye.constants import MILLIRADIAN, TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.calibration import Calibration
@@ -27,7 +27,6 @@ from catseye.reduction.calibrations.ranging.leftover import leakage_effects
 from catseye.signal.systematics.amplitude import amplitude_by_coefficient
 
 KIND = "amplitude-to-phase"
-MILLIRADIAN = 1e-3  # rad
 PHASE, VOLTS = Within(-2 * TWO_PI, 2 * TWO_PI), Within(0, 20, above=True)
 SCATTER = "scatter of the phase at the reference amplitude"
 LINE_LEVEL = 0.05  # of the test of a further, quadratic term

@@ -10,7 +10,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from catseye.constants import TWO_PI
+from catseye.constants import MILLIRADIAN, TWO_PI
 from catseye.errors import EstimationError
 from catseye.records.files.readings import TEXT, Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
@@ -20,7 +20,6 @@ from catseye.reduction.calibrations.check_outcome import CheckOutcome
 from catseye.reduction.calibrations.kind import CalibrationKind, Plausibility, PlausibleSpan, provenance, quantities
 
 KIND = "feedback"
-MILLIRADIAN = 1e-3  # rad
 PHASE, VOLTS = Within(-2 * TWO_PI, 2 * TWO_PI), Within(0, 20, above=True)
 LEVEL = 0.05  # chance of an excess that is none
 DRIFT = 3.1  # standard deviations of the ratio of steps: once in a thousand

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
-from catseye.constants import TWO_PI
+from catseye.constants import MILLIRADIAN, TWO_PI
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
 from catseye.reduction.calibrations.budget import SharedInput
@@ -103,6 +103,7 @@ def measure_oscillator(readings: SheetReadings, reject: bool = False) -> Calibra
         curve={
             "readings": (np.log10(time[positive]), np.log10(allan.deviation[positive])),
             "fit": (np.log10(time[line]), np.log10(fitted[line])),
+            "averages": (allan.size, allan.deviation / MILLIRADIAN),
         },
         axes=("averaging time (log10 of s)", "Allan deviation (log10 of rad)"),
         method="The spectrum of the unwrapped phases, a straight line taken out, is fitted with white, flicker and "

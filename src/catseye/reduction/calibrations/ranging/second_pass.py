@@ -12,7 +12,7 @@ from typing import Annotated
 
 import numpy as np
 
-from catseye.constants import TWO_PI
+from catseye.constants import MILLIRADIAN, TWO_PI
 from catseye.errors import EstimationError
 from catseye.records.files.readings import Sheet, SheetLayout, SheetReadings
 from catseye.records.files.record import Within
@@ -33,7 +33,6 @@ from catseye.signal.systematics.leakage import phase_by_leakage
 from catseye.signal.systematics.multipath import second_pass_turn
 
 KIND = "second-pass"
-MILLIRADIAN = 1e-3  # rad
 PHASE, VOLTS = Within(-2 * TWO_PI, 2 * TWO_PI), Within(0, 20, above=True)
 SCATTER = "scatter of a difference of phases"
 LEAST_RATIO = 1.5  # of the two amplitudes: below it the second pass is little more than a third of itself
