@@ -52,14 +52,17 @@ def test_with_every_effect_in_twin_and_reduction_errors_are_those_claimed(clear,
     assert 0.65 < c.variance_factor < 1.35
 
 
-def test_a_mirrors_offset_taken_as_247_mm_straight_up_spoils_the_ground_rangers(few_clear, monkeypatch):
+def test_mirrors_offsets_taken_as_247_mm_straight_up_are_a_wrong_scale_of_the_survey(few_clear, monkeypatch):
+    """The dz of -0.8 mm lies along a horizontal axis, which points to the telescope from each monument, 120 m away."""
     monkeypatch.setattr(
         places, "scan_point", lambda fixed, gamma, offset: np.add(fixed, [0.0, 0.0, np.linalg.norm(offset)])
     )
     wrong = reduce_epoch(few_clear[0])
-    # dz is -0.8 mm along a horizontal axis: 0.8 / sqrt(3) a coordinate, of which the ranges between them take some back
-    assert 0.2e-3 < moved(few_clear[1], wrong, "ground") < 0.8e-3
-    assert moved(few_clear[1], wrong, "ball") > 20e-6
+    (contradiction,) = wrong.coordinates.contradictions
+    assert contradiction.named.of == "scale of all monuments"
+    assert contradiction.named.errors[0] == pytest.approx(-1e6 * 0.8 / 120e3, abs=1.0)
+    assert wrong.verdict.word == "doubtful"
+    assert 20e-6 < moved(few_clear[1], wrong, "ground") < 0.2e-3
 
 
 def test_a_twin_with_the_opposite_h_corr_sign_is_off_by_a_tenth_of_a_millimetre(clear, clear_night, errors, written):

@@ -113,9 +113,12 @@ def _judged(settled: SettledNetwork, progress: Progress | None) -> SettledNetwor
             settled = iterate_adjustment(network, _places(settled), progress, active=active)
         except (EstimationError, InputError):
             tried = allowance.errors.keys() - before.errors.keys()
-            if not tried:
+            if tried:
+                settled = settled._replace(network=replace(settled.network, allowance=before.refusing(tried)))
+            elif before.errors.keys() - allowance.errors.keys():  # what was taken back as innocent is needed
+                return settled._replace(network=replace(settled.network, allowance=before))
+            else:
                 raise
-            settled = settled._replace(network=replace(settled.network, allowance=before.refusing(tried)))
     return settled
 
 
