@@ -294,6 +294,13 @@ def test_point_has_its_epochs_with_covariance_and_shots(watch, entries):
         watch.point("NOWHERE")
 
 
+def test_nothing_is_dropped_after_the_last_event(watch):
+    """A page by another clock asks so, before it knows the site's."""
+    table = jsoned(watch.dropped(since=watch.dropped()["bins"][-1] + 1000.0, bins=4))
+    assert len(table["bins"]) == 4
+    assert not any(map(sum, (*table["good"], *table["failed"])))
+
+
 def test_dropped_counts_every_shot_once(watch, entries):
     table = jsoned(watch.dropped(bins=10))
     answered = of(entries, AnsweredShot)

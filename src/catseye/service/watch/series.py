@@ -256,11 +256,15 @@ def series_names(history: History, site: SiteMap) -> Object:
 
 
 def dropped_object(history: History, site: SiteMap, since: float | None, until: float | None, bins: int) -> Object:
-    """Good and failed shots of each ranger in bins of equal time."""
+    """Good and failed shots of each ranger in bins of equal time, to the last event; none where `since` is later."""
     if not 1 <= bins <= 1000:
         raise InputError(f"bins = {bins} (expected 1 to 1000)")
     first, last = history.span()
-    since, until = (first if since is None else since), (last if until is None else until)
+    since = first if since is None else since
+    if until is None:
+        until = last
+        if since is not None and last is not None and since >= last:  # a page that does not know the site's clock yet
+            until = since + MINUTE_TICKS / TICKS_PER_DAY
     if since is None or until is None or not since < until:
         raise InputError(f"since = {since}, until = {until} (expected an earlier and a later MJD)")
     low, high = limits(since, until)
