@@ -50,7 +50,7 @@ def unpacked(wheel: Path, directory: Path) -> Path:
 
 
 def run_there(where: Path, pieces: list[tuple[str, str]], python: Path, site: Path) -> list[dict]:
-    """What each piece did, all in one process: exit status, what it said, seconds of the processor.
+    """Results of the pieces, all run in one process: exit status, printed text, seconds of the processor.
 
     where    directory that they run in
     pieces   ("python", source) or ("catseye", JSON list of a command line)

@@ -111,7 +111,7 @@ def test_journal_gives_the_rows_that_the_coordinator_held(name):
 
 
 def test_journal_gives_the_corrections_with_their_zero_moves_and_switch(tmp_path):
-    """Of six epochs the third begins another zero, the fifth was not given, and a move came before the fourth."""
+    """Six epochs: the third begins another zero, the fifth was not given, and a move came before the fourth."""
     with JournalReader(recorded()) as reader:
         solved = next(e for e in entries() if isinstance(e, EpochSolution) and e.answer)
         a_run = Run(reader.site(1), reader.run().settings)
