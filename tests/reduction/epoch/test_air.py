@@ -65,6 +65,15 @@ def test_ordinary_readings_are_not_blamed_for_air_that_the_ranges_ask_for(night_
             field.along(at(start, 1800.0), low, high, np.array([0.0, 0.0, bend]))
 
 
+def test_readings_that_no_index_formula_covers_are_refused_with_their_stations(night_01):
+    """55 °F typed as °C: dry enough to be air of a desert, and beyond the formula."""
+    campaign, _ = weathered(night_01, [0.0, 40.0], np.array([0.0, 3600.0]), lambda _, i: 55.3)
+    with pytest.raises(
+        InputError, match=r"S0 55\.3 °C \(12\.9 °C if these are degrees Fahrenheit\).*outside -40 to 50"
+    ):
+        AirField.of(campaign, ReductionSettings())
+
+
 @pytest.mark.parametrize("wander", [0.0, 0.3])
 def test_noise_of_readings_falls_to_the_records_claim(night_01, wander):
     """Of air that stands still far below a reading's 0.05 °C, of air that wanders by 0.3 °C a root hour by a half."""

@@ -16,6 +16,7 @@ from catseye.atmosphere.path.mean import nodes_along, pressure_at
 from catseye.atmosphere.weather.humidity import vapour_pressure_hpa
 from catseye.constants import SECONDS_PER_DAY
 from catseye.errors import InputError, ValidityError
+from catseye.estimation.series.trend import Trend
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.air.process import LEVEL_HEIGHT, U_LAG, U_RADIATION, USUAL, AirKnots
 from catseye.reduction.epoch.air.sounded import SoundedLine, sounded_lines
@@ -112,8 +113,8 @@ class AirField:
                 (float(shots.min()), float(shots.max())),
                 len(shots),
                 [r.temperature_c for r in records],
-                temperature_equivalents(
-                    records, float(shots.mean()), wavelength_um=site.ranging.wavelength_um, model=settings.air_model
+                _equivalents(
+                    records, [s.name for s in stations], float(shots.mean()), site.ranging.wavelength_um, settings
                 ),
                 zeta=None if flat else _zeta(heights, heights),
             ),
@@ -440,6 +441,27 @@ class _Nodes:
         return _Nodes(
             z=z, east=east, north=north, zeta=zeta, share=share, profile=profile, weight=nodes_along(0.0, 1.0, NODES)[1]
         )
+
+
+def _equivalents(
+    records: Sequence[StationRecord],
+    stations: Sequence[str],
+    seconds: float,
+    wavelength_um: float,
+    settings: ReductionSettings,
+) -> list[tuple[Trend, float]]:
+    """Temperature equivalents of pressure and humidity; InputError for readings that no index formula covers."""
+    try:
+        return temperature_equivalents(records, seconds, wavelength_um=wavelength_um, model=settings.air_model)
+    except ValidityError as problem:
+        readings = "; ".join(
+            f"{name} {t:.1f} °C{_hot(t)}, {p:.1f} hPa, {h:.0f} %"
+            for name, (t, p, h) in zip(stations, states_at(records, np.array([seconds]))[0], strict=True)
+        )
+        raise InputError(
+            f"weather.csv: in the middle of the shots the stations read {readings}: {problem} (check these readings, "
+            "or leave a station out of site.toml and weather.csv)"
+        ) from problem
 
 
 def _hot(reading_c: float) -> str:
