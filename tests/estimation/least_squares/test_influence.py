@@ -1,5 +1,7 @@
 """Influence of left-out observations on all other tests, against a new adjustment."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,19 @@ def test_tests_without_some_are_those_of_an_adjustment_without_them(seed):
     np.testing.assert_allclose(
         tests.detectable[on], np.concatenate([f.detectable_error for f in plain.fits])[on], rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_error_moves_the_parameters_as_a_new_adjustment_says(seed):
+    every = groups(seed)
+    solution = adjust(np.zeros(3), every)
+    influence = Influence(every, solution)
+    errors = np.random.default_rng(seed).standard_normal((len(influence.active), 2))
+    moved = influence.moved(errors)
+    for k in range(2):
+        pieces = np.split(errors[:, k], influence.first[1:-1])
+        wrong = [replace(group, observed=group.observed + e) for group, e in zip(every, pieces, strict=True)]
+        np.testing.assert_allclose(moved[:, k], adjust(np.zeros(3), wrong).x - solution.x, rtol=1e-9, atol=1e-12)
 
 
 def test_observations_checked_only_by_the_removed_one_become_unchecked():

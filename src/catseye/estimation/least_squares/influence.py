@@ -106,20 +106,8 @@ class Influence:
 
     def through(self, vectors: np.ndarray) -> np.ndarray:
         """P_v times vectors (rows, k), one product per row."""
-        unit, right = [], np.zeros((len(self._q.diagonal()), vectors.shape[1]))
-        for rows, design, low, high in zip(self._rows, self._designs, self.first, self.first[1:], strict=False):
-            one = vectors[low:high]
-            if one.any():
-                one = rows.weigh(np.where(rows.active[:, None], one, 0.0))
-                touched = np.flatnonzero(one.any(axis=1))
-                if rows.columns.ndim == 1:
-                    right[rows.columns] += design[touched].T @ one[touched]
-                else:
-                    at = rows.row_columns()[touched]
-                    pull = design[touched][:, :, None] * one[touched][:, None]
-                    np.add.at(right, np.maximum(at, 0), np.where(at[..., None] < 0, 0.0, pull))
-            unit.append(one)
-        moved = self._q.solve(right)
+        unit, pull = self._pulled(vectors)
+        moved = self._q.solve(pull)
         columns = []
         for rows, design, one in zip(self._rows, self._designs, unit, strict=True):
             if rows.columns.ndim == 1:
@@ -132,3 +120,24 @@ class Influence:
                     shift += masked[:, j : j + 1] * moved[at[:, j]]
             columns.append(one - rows.weigh(shift))
         return np.concatenate(columns).T
+
+    def moved(self, vectors: np.ndarray) -> np.ndarray:
+        """Shift (n, k) of the parameters by errors of the observations (rows, k): Q A'P times these."""
+        return self._q.solve(self._pulled(vectors)[1])
+
+    def _pulled(self, vectors: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+        """P times vectors (rows, k), group by group, and A'P times them (n, k)."""
+        unit, pull = [], np.zeros((len(self._q.diagonal()), vectors.shape[1]))
+        for rows, design, low, high in zip(self._rows, self._designs, self.first, self.first[1:], strict=False):
+            one = vectors[low:high]
+            if one.any():
+                one = rows.weigh(np.where(rows.active[:, None], one, 0.0))
+                touched = np.flatnonzero(one.any(axis=1))
+                if rows.columns.ndim == 1:
+                    pull[rows.columns] += design[touched].T @ one[touched]
+                else:
+                    at = rows.row_columns()[touched]
+                    change = design[touched][:, :, None] * one[touched][:, None]
+                    np.add.at(pull, np.maximum(at, 0), np.where(at[..., None] < 0, 0.0, change))
+            unit.append(one)
+        return unit, pull

@@ -67,6 +67,12 @@ class PatternFit:
         return replace(self, gain=float(parts @ parts), degrees=int(np.count_nonzero(used)))
 
     @property
+    def spread(self) -> np.ndarray:
+        """Factor (k, k + 1) of the second moments of the errors: the estimates, and a root of their covariance."""
+        values, directions = np.linalg.eigh(self.covariance)
+        return np.column_stack([np.nan_to_num(self.errors), directions * np.sqrt(np.maximum(values, 0.0))])
+
+    @property
     def score(self) -> float:
         """Gain less the price of errors beyond the first, comparable with the square of a single w."""
         return self.gain - price(self.degrees)
