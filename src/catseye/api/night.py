@@ -87,7 +87,7 @@ class NightResult(Result):
 
     @property
     def unchecked(self) -> tuple[str, ...]:
-        """Points that an error of one line could move unseen."""
+        """Points that an error of one line or survey could move unseen."""
         return self.reduction.coordinates.unchecked
 
     @property

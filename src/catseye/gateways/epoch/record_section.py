@@ -229,8 +229,8 @@ def checks_section(reduction: Reduction) -> ReportSection:
     lead = (
         "A line is one ranger and one target, whatever the number of shots on it: shots on one line agree with each "
         "other whatever is wrong with it, so lines check each other, and repeated shots do not. An error of "
-        "one line could move an unchecked point unseen; pose and surface leave such points out where enough others "
-        "remain."
+        "one line, or of a monument's survey in a direction that no line tests, could move an unchecked point unseen; "
+        "pose and surface leave such points out where enough others remain."
     )
     blocks: list[Block] = [Text(lead), TableBlock("lines", _lines(reduction))]
     if coordinates.unchecked:

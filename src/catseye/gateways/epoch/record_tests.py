@@ -267,7 +267,8 @@ def checks_sentences(coordinates: AdjustedCoordinates) -> list[str]:
     if coordinates.scatter:
         sentences.append(f"By class of points: {', '.join(map(_class_words, coordinates.scatter))}.")
     if coordinates.unchecked:
-        sentences.append(f"Unchecked, as an error of one line could move them unseen: {some(coordinates.unchecked)}.")
+        why = "as an error of one line or survey could move them unseen"
+        sentences.append(f"Unchecked, {why}: {some(coordinates.unchecked)}.")
     hidden = {}
     for test in sorted(coordinates.records, key=lambda t: t.detectable):
         if test.unchecked and test.record.endswith(" alike"):  # of several parts the least known

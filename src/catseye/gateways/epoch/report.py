@@ -114,7 +114,11 @@ def _record_cards(reduction: Reduction) -> list[Card]:
         cards.append(Card("Contradictions", f"{count}" if count else "none", remark))
     if coordinates.unchecked:
         cards.append(
-            Card("Unchecked points", f"{len(coordinates.unchecked)}", "an error of one line could move them unseen")
+            Card(
+                "Unchecked points",
+                f"{len(coordinates.unchecked)}",
+                "an error of one line or survey could move them unseen",
+            )
         )
     return cards
 

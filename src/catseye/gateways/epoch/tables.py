@@ -253,7 +253,7 @@ COORDINATES = Table[PointRows](
         Column(
             "status",
             "",
-            "`checked`, or `unchecked` where an error of one line could move it unseen",
+            "`checked`, or `unchecked` where an error of one line or survey could move it unseen",
             lambda r: r.status,
         ),
     ),

@@ -40,7 +40,7 @@ class SolvedPoints:
     verdict      of the reduction; None if the file has none
     dish         names of the prisms of its surface, if it has one
     focal_length of that surface, m
-    unchecked    points that an error of one of their lines would move unseen
+    unchecked    points that an error of one of their lines, or of a survey, would move unseen
     """
 
     file: str

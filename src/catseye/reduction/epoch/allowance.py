@@ -159,11 +159,6 @@ class Allowance:
         reasons = (*self.reasons, AllowanceReason(text))
         return replace(self, refused=self.refused | set(keys), searched=True, reasons=reasons)
 
-    def leaning(self, errors: Mapping[RecordKey, tuple[float, ...]], text: str) -> "Allowance":
-        """Allowance for common errors that the ranges contradict a little, as chance may."""
-        reason = AllowanceReason(f"the ranges lean to an error of {text}: the uncertainties include it", doubtful=False)
-        return replace(self, errors={**self.errors, **errors}, reasons=(*self.reasons, reason))
-
     def acquitting(self, keys: Collection[RecordKey]) -> "Allowance":
         """Allowance that keeps records which were named, and are right beside what was named later."""
         remaining = tuple(
@@ -233,7 +228,7 @@ def for_the_air(
                 f"{off / air.sigmas[i]:.1f} of its record's u, or to another scale or pressure: the uncertainties "
                 "include this"
             )
-            reasons.append(AllowanceReason(text, thermometer))
+            reasons.append(AllowanceReason(text, thermometer, doubtful=False))
     gradient = air.steepest(values)
     if air.profile == BEND.part and not STEEPEST_DOWN <= gradient <= STEEPEST_UP:
         apart = abs(gradient - (0.0 if gradient > 0.0 else USUAL_GRADIENT)) * float(np.ptp(air.heights))

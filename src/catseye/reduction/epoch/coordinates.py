@@ -15,12 +15,13 @@ from catseye.errors import InputError
 from catseye.estimation.least_squares.adjustment import (
     GroupFit,
 )
-from catseye.estimation.least_squares.covariance import JointPoints
+from catseye.estimation.least_squares.covariance import JointPoints, Widened
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.allowance import Allowance
 from catseye.reduction.epoch.common_errors import considered
 from catseye.reduction.epoch.contradictions.contradiction import ClassScatter, Contradiction, GroupTest, RecordTest
 from catseye.reduction.epoch.head import head_unknowns
+from catseye.reduction.epoch.hidden_errors import hidden_shifts, leaning_of
 from catseye.reduction.epoch.lines.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.lines.frequency_cycles import FrequencyCycles
 from catseye.reduction.epoch.lines.frequency_places import PlacedCampaign, placed_by_frequencies
@@ -234,9 +235,14 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
     adjusted = solution.q.diagonal()
     solution = considered(network, solution, shots)
     solution = network.allowance.considered(network.field, solution, network.layout.air)
+    tested, is_night = EpochRecords(network, settled.solution, shots), network.motion is None
+    leaning = leaning_of(tested) if is_night else None
+    if leaning is not None:
+        solution = replace(solution, q=Widened(solution.q, leaning.reach))
+    by_survey = hidden_shifts(tested, solution.q) if is_night else {}
     layout, campaign = network.layout, network.campaign
     doubtful = resolved.doubtful | set(ranges.ill_fitting)
-    independence = independence_of(network, tests, claimed=solution.q, doubtful=doubtful)
+    independence = independence_of(network, tests, claimed=solution.q, by_survey=by_survey, doubtful=doubtful)
     places = {n: place for n, place in network.places.items() if n not in independence.unmeasured}
     names = sorted([*places, *(str(Parameter(ParameterKind.FIXED_POINT, m)) for m in campaign.monuments)])
     columns = np.array([layout.columns(n) for n in names])
@@ -259,7 +265,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
     air = {n: value for n, value in air_estimates.items() if n not in sound}
     disagreement = (resolved.frequencies.disagreement,) if resolved.frequencies.disagreement else ()
     wrong, refuted = wrong_records(network), network.allowance.refuted
-    records, groups = record_tests(EpochRecords(network, settled.solution, shots)) if with_records else ((), ())
+    records, groups = record_tests(tested) if with_records else ((), ())
     heads = {
         str(layout.parameters[column]): column
         for n in network.rangers
@@ -293,6 +299,11 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
         fits=solution.fits,
         notes=(
             *record_notes(network, solution, wrong, count),
+            *(
+                [f"the ranges lean to an error of {leaning.text}, as chance may: the uncertainties include it"]
+                if leaning is not None
+                else []
+            ),
             *sound_notes(network, solution, ranges, sound),
             *loss_notes(ranges, independence, network.settings.critical),
             *resolved.notes,

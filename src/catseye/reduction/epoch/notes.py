@@ -68,7 +68,7 @@ def loss_notes(ranges: RangeShots, independence: Independence, critical: float) 
                 if name in independence.unmeasured
                 else f"{name}: none of its {len(mine)} shots fits: its coordinates follow from what else is known of it"
             )
-        elif not used.all() and name not in independence.doubtful and independence.unchecked([name]):
+        elif not used.all() and name not in independence.doubtful and independence.by_lines(name):
             lines = independence.lines[name]
             unchecked[name] = (
                 f"{name}: {(~used).sum()} of its {len(mine)} shots contradict the rest, and nothing checks the "
@@ -112,7 +112,7 @@ def loss_doubts(ranges: RangeShots, independence: Independence, units: Mapping[s
     for name, rows in _by_target(ranges):
         unit = units.get(name, name)
         targets.setdefault(unit, []).append(rows[judged[rows]])
-        if independence.unchecked([name]):
+        if independence.by_lines(name):
             unchecked.add(unit)
     doubts = []
     for name in sorted(unchecked):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtrc, chdtri
+from scipy.special import chdtrc
 
 from catseye.constants import MILLIMETRE
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY, GroupFit, LeastSquaresSolution
@@ -29,14 +29,13 @@ from catseye.reduction.epoch.contradictions.contradiction import (
     RecordTest,
 )
 from catseye.reduction.epoch.contradictions.hypotheses import (
-    BODIES,
     DIRECTIONS,
-    EVERYTHING,
-    TELESCOPE,
     Hypothesis,
     RecordKey,
     frequency_texts,
+    is_parameter,
     line_hypothesis,
+    parameter_of,
     patterns_of,
     range_hypotheses,
 )
@@ -49,7 +48,6 @@ from catseye.reduction.epoch.unknowns import CampaignNetwork
 MARGIN = 9.0  # difference of scores below which two explanations are not told apart
 SUSPECTED = 3.0  # |w| from which a single number, or a line's shots, is an explanation to be compared
 MOST = 6  # contradictions explained at once
-LEANING = 0.01  # level from which an error that all points share is allowed for, though it may be chance
 NAMED, LISTED = 10.0, 1.0  # sigma of the wider prior over the error found: of a named record; of one of several
 FARTHEST_MM = 20.0  # error of a place beyond which whole cycles may be wrong, and the test with them
 LONGEST_MM = 100.0  # error of a length that all shots on it share: half a wavelength
@@ -63,6 +61,7 @@ LARGEST = {  # errors beyond which an explanation is impossible, in the unit of 
     RecordGroup.LEAKAGE: 200.0,  # mV: a tenth of a usual return
     RecordGroup.MOVEMENTS: 20.0,  # mm/h: a telescope that is driven moves faster, pillars and steel do not
 }
+KNOWN = 1e-3  # information of the data over a prior's, below which they say nothing of a parameter
 LARGEST_GROUP = 300  # records tested together; of more, as of glass constants, each is tested alone
 
 
@@ -183,44 +182,22 @@ def findings_of(records: EpochRecords) -> Findings:
     impossible = None
     for _ in range(MOST):
         fits = list(zip(hypotheses, tests.fits, strict=True))
-        possible = [(h, fit) for h, fit in fits if _possible(h, fit)]
+        possible = [(h, fit) for h, fit in fits if is_possible(h, fit)]
         best = max((fit.score for _, fit in possible if fit.significant), default=0.0)
         if best == 0.0:
             rejected = [(h, fit) for h, fit in fits if fit.significant]
             if rejected and not explained:
-                impossible = _explanation(*max(rejected, key=lambda pair: pair[1].score))
+                impossible = explanation_of(*max(rejected, key=lambda pair: pair[1].score))
             break
         near = [(h, fit) for h, fit in possible if fit.score > max(best - MARGIN, 0.5 * best)]
         near.sort(key=lambda pair: -pair[1].score)
-        explained.append(Contradiction(tuple(_explanation(h, fit) for h, fit in near)))
+        explained.append(Contradiction(tuple(explanation_of(h, fit) for h, fit in near)))
         share = NAMED if len(near) == 1 else LISTED
         for h, fit in near:
             size = share * float(np.linalg.norm(np.nan_to_num(fit.errors)))
             errors[h.key] = (size,) * len(h.parts)
         tests.accept(hypotheses.index(near[0][0]))
     return _without_many_zeros(Findings(tuple(explained), errors, impossible), len(records.network.rangers))
-
-
-def leaning_of(records: EpochRecords) -> tuple[dict[RecordKey, tuple[float, ...]], str] | None:
-    """Common errors that the ranges contradict a little; None without one.
-
-    What all rangers or stations share moves all points alike, so that one in a hundred matters; what one record states
-    moves few. Returns the sigmas to be allowed for, of each record that explains it about as well, and these in words.
-    """
-    common = [
-        h
-        for h in records.rivals
-        if h.key.of in (EVERYTHING, TELESCOPE, *BODIES) or h.key.group is RecordGroup.THERMOMETERS
-    ]
-    tests = PatternTests(Influence(records.groups, records.solution), records.patterns(common))
-    possible = [(h, fit) for h, fit in zip(common, tests.fits, strict=True) if _possible(h, fit)]
-    likely = [fit.score for _, fit in possible if fit.gain > chdtri(fit.degrees, LEANING)]
-    if not likely:
-        return None
-    near = [(h, fit) for h, fit in possible if fit.score > 0.5 * max(likely)]
-    near.sort(key=lambda pair: -pair[1].score)
-    errors = {h.key: (LISTED * float(np.linalg.norm(np.nan_to_num(fit.errors))),) * len(h.parts) for h, fit in near}
-    return errors, "; or ".join(_explanation(h, fit).text for h, fit in near)
 
 
 def innocent_of(records: EpochRecords) -> list[RecordKey]:
@@ -231,9 +208,40 @@ def innocent_of(records: EpochRecords) -> list[RecordKey]:
     if len(allowance.contradictions) < 2 or not accused:
         return []
     tests = PatternTests(Influence(records.groups, records.solution), records.patterns(accused))
+    fits = [_parameter_fit(records, h) or tests.fit(i) for i, h in enumerate(accused)]
     return [
-        h.key for i, h in enumerate(accused) if not tests.fit(i).beside(np.array(allowance.errors[h.key])).significant
+        h.key
+        for h, fit in zip(accused, fits, strict=True)
+        if not fit.beside(np.array(allowance.errors[h.key])).significant
     ]
+
+
+def _parameter_fit(records: EpochRecords, hypothesis: Hypothesis) -> PatternFit | None:
+    """Fit of an error that is allowed for as parameters; None of another.
+
+    A pattern beside parameters that are as free as the data leaves nothing to estimate but their prior. So the fit
+    follows from these: with the prior S, estimate x and covariance Q, the data alone have the information Q^-1 - S^-1
+    and the right side Q^-1 x. Directions without information are undetermined.
+    """
+    sigma = np.array(records.network.allowance.errors.get(hypothesis.key, ()))
+    if not len(sigma) or not is_parameter(hypothesis.key):
+        return None
+    columns = records.network.layout.columns(parameter_of(hypothesis.key), len(sigma))
+    inverse = np.linalg.inv(records.solution.q.within(columns) / np.outer(sigma, sigma))
+    values, directions = np.linalg.eigh(inverse - np.eye(len(sigma)))
+    used = values > KNOWN
+    by_data = directions[:, used] / values[used] @ directions[:, used].T
+    errors = by_data @ inverse @ (records.solution.x[columns] / sigma)
+    seen = np.sum(directions[:, used] ** 2, axis=1)
+    covariance = (by_data + np.diag(seen)) * np.outer(sigma, sigma)
+    determined = seen > KNOWN
+    return PatternFit(
+        gain=float(errors @ np.linalg.solve(by_data + np.eye(len(sigma)), errors)),
+        degrees=int(np.count_nonzero(used)),
+        errors=np.where(determined, errors * sigma, np.nan),
+        u=np.where(determined, np.sqrt(np.diag(covariance)), np.inf),
+        covariance=covariance,
+    )
 
 
 def _without_many_zeros(findings: Findings, rangers: int) -> Findings:
@@ -247,7 +255,7 @@ def _without_many_zeros(findings: Findings, rangers: int) -> Findings:
     return Findings(remaining, errors, zeros[0].named)
 
 
-def _possible(hypothesis: Hypothesis, fit: PatternFit) -> bool:
+def is_possible(hypothesis: Hypothesis, fit: PatternFit) -> bool:
     """True for an error that such a record can have."""
     group = hypothesis.key.group
     in_mm = FARTHEST_MM if len(hypothesis.parts) > 1 else LONGEST_MM
@@ -257,7 +265,7 @@ def _possible(hypothesis: Hypothesis, fit: PatternFit) -> bool:
     return limit is None or bool(np.nanmax(np.abs(fit.errors)) <= limit * abs(hypothesis.per_unit))
 
 
-def _explanation(hypothesis: Hypothesis, fit: PatternFit) -> RecordError:
+def explanation_of(hypothesis: Hypothesis, fit: PatternFit) -> RecordError:
     determined = np.isfinite(fit.u)
     return RecordError(
         group=hypothesis.key.group,
@@ -290,8 +298,10 @@ def record_tests(records: EpochRecords) -> tuple[tuple[RecordTest, ...], tuple[G
 
 
 def _rows(hypothesis: Hypothesis, tests: PatternTests, at: np.ndarray, records: EpochRecords) -> list[RecordTest]:
-    """Tests of a record's numbers; of a movement together, of others each by itself."""
-    together = tests.fit_of(at) if hypothesis.key.group is RecordGroup.MOVEMENTS else None
+    """Tests of a record's numbers; of a movement, or of parameters, together, of others each by itself."""
+    together = _parameter_fit(records, hypothesis)
+    if together is None and hypothesis.key.group is RecordGroup.MOVEMENTS:
+        together = tests.fit_of(at)
     allowed = records.network.allowance.errors.get(hypothesis.key, (0.0,) * len(hypothesis.parts))
     result = []
     for k, part in enumerate(hypothesis.parts):

@@ -31,7 +31,7 @@ from catseye.reduction.epoch.prior_names import (
     UNJUDGED,
     ZEROS,
 )
-from catseye.reduction.epoch.record_tests import EpochRecords, Findings, findings_of, innocent_of, leaning_of
+from catseye.reduction.epoch.record_tests import EpochRecords, Findings, findings_of, innocent_of
 from catseye.reduction.epoch.self_check import self_checks, sortings
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts, shot_group
 from catseye.reduction.epoch.sway import with_sway
@@ -355,8 +355,6 @@ def allowed(settled: SettledNetwork) -> Allowance:
         return allowance.explained(findings.contradictions, findings.errors)
     if not allowance.searched and _stopped(settled):
         return replace(allowance, searched=True, reasons=(*allowance.reasons, *_impossible(findings)))
-    if network.motion is None and (leaning := leaning_of(records)):
-        return allowance.leaning(*leaning)
     named = {
         Parameter(ParameterKind.THERMOMETER, k.of) for k in allowance.errors if k.group is RecordGroup.THERMOMETERS
     }

@@ -25,13 +25,15 @@ def rangers_of(reduction, target):
     return sorted({ranger for ranger, name, used in rows if used and name == target})
 
 
-def test_only_benchmarks_with_a_second_line_are_unchecked_in_night_01(reduced_night_01):
-    # their certificates are those of the other line; 3 of 130 points
+def test_benchmarks_with_a_second_line_and_a_ranger_in_one_plane_are_unchecked_in_night_01(reduced_night_01):
+    # the certificates are those of the other line; the ranger's lines leave one direction untested; 4 of 130 points
     coordinates = reduced_night_01.coordinates
-    assert coordinates.unchecked == ("ZBM01", "ZBM03", "ZBM05")
+    *marks, ranger = coordinates.unchecked
+    assert marks == ["ZBM01", "ZBM03", "ZBM05"]
+    assert ranger == "ZY105"
     assert coordinates.unmeasured == ()
     assert len(coordinates.lines) == len(coordinates.points)
-    assert coordinates.lines[coordinates.rows(coordinates.unchecked)].tolist() == [2, 2, 2]
+    assert coordinates.lines[coordinates.rows(marks)].tolist() == [2, 2, 2]
     assert set(reduced_night_01.surface.names).isdisjoint(coordinates.unchecked)
     assert reduced_night_01.surface.unchecked == ()
 

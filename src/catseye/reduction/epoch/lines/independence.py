@@ -1,4 +1,4 @@
-"""Independent lines at each point, and points that an error of one line could move unseen.
+"""Independent lines at each point, and points that an error of one line or survey could move unseen.
 
 All shots of one ranger on one target are one line: an obstacle, a stray reflection or a wrong number of half
 wavelengths is common to its repeats, which therefore do not check each other. The other lines do, and the records (a
@@ -19,7 +19,9 @@ from catseye.reduction.epoch.lines.line_tests import LineTests
 from catseye.reduction.epoch.prior_names import APPROXIMATE
 from catseye.reduction.epoch.unknowns import CampaignNetwork
 
+HARDLY_CHECKED = 0.1  # redundancy of a survey, below which its errors hardly show [FOERSTNER16]
 LARGEST_SHIFT = NONCENTRALITY * (1.0 / UNCHECKED - 1.0) ** 0.5  # of a point, in its u: an error that nothing tests
+LARGEST_BY_SURVEY = NONCENTRALITY * (1.0 / HARDLY_CHECKED - 1.0) ** 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,18 +30,24 @@ class Independence:
 
     lines        point: lines with a used shot, to it or from it
     shift        point: its largest shift by an error of one line that is found four times in five, over its u
+    by_survey    the same by an error of one monument's survey
     unmeasured   ranged targets and rangers of which nothing but the typed position is known, sorted
     doubtful     points that may be wrong by whole half wavelengths, and rangers most of whose shots do not fit
     """
 
     lines: Mapping[str, int]
     shift: Mapping[str, float]
+    by_survey: Mapping[str, float]
     unmeasured: tuple[str, ...]
     doubtful: frozenset[str]
 
     def unchecked(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Points among `names` that are doubtful, or that an error of one line could move unseen."""
-        return tuple(n for n in names if n in self.doubtful or self.shift.get(n, 0.0) > LARGEST_SHIFT)
+        """Points among `names` that are doubtful, or that an error of one line or survey could move unseen."""
+        return tuple(n for n in names if self.by_lines(n) or self.by_survey.get(n, 0.0) > LARGEST_BY_SURVEY)
+
+    def by_lines(self, name: str) -> bool:
+        """True for a point that is doubtful, or that an error of one line could move unseen."""
+        return name in self.doubtful or self.shift.get(name, 0.0) > LARGEST_SHIFT
 
 
 def independence_of(
@@ -47,13 +55,14 @@ def independence_of(
     tests: Sequence[LineTests],
     *,
     claimed: Covariance,
+    by_survey: Mapping[str, float],
     doubtful: frozenset[str] = frozenset(),
 ) -> Independence:
     """Lines at each point of an adjusted network.
 
     tests     one of each ranger
     claimed   covariance of the parameters, with all errors that their uncertainties include
-    doubtful  as `Independence` has it
+    by_survey, doubtful   as `Independence` has them
 
     Source: [BAARDA68], external reliability: sqrt(dx' C^-1 dx) of a point for the smallest error that is found.
     """
@@ -68,7 +77,7 @@ def independence_of(
         for target, by_one_u in zip(mine.targets, mine.moved, strict=True):
             for name, dx in zip((ranger, target), NONCENTRALITY * by_one_u, strict=True):
                 shift[name] = max(shift.get(name, 0.0), float(np.sqrt(max(dx @ weight[name] @ dx, 0.0))))
-    return Independence(lines, shift, _unmeasured(network, lines), doubtful)
+    return Independence(lines, shift, by_survey, _unmeasured(network, lines), doubtful)
 
 
 def _unmeasured(network: CampaignNetwork, lines: Mapping[str, int]) -> tuple[str, ...]:
