@@ -1,15 +1,15 @@
 """Hostile nights: how a reduction answers each kind of wrong record and of unexpected nature."""
 
 from hostile.outcome import DOUBTFUL, OUTCOMES, SILENT
-from hostile.rows import FIRST_SEED, HONEST, NAMES, TWO, sizes_of, unit_of
+from hostile.rows import HONEST, NAMES, TWO, UNTRIED_SEED, sizes_of, unit_of
 from hostile.run import cases, outcomes, row_of
 
-MANY = {TWO: 40 / 9, HONEST: 200 / 9}  # times as many nights as of the others: with 9, those of test_hostile_nights
+MANY = {TWO: 40 / 9, HONEST: 200 / 9}  # times as many nights as of the others: with 9, 400 and 200
 
 
 def nights_of(name, count):
     """Nights of a row: its sizes by turns."""
-    return cases([name], range(FIRST_SEED, FIRST_SEED + round(count * MANY.get(name, 1))), cycle=True)
+    return cases([name], range(UNTRIED_SEED, UNTRIED_SEED + round(count * MANY.get(name, 1))), cycle=True)
 
 
 def measured(count, say, jobs):

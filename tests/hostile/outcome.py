@@ -24,6 +24,7 @@ ACCUSING = re.compile(
     r"thermometer is biased by|'s zero is not the sheet's|: its typed position is|: not the mirror sheet's"
     r"|'s is wrong, or its elevation|more likely its survey, mirror sheet or samples"
 )
+LEANING = "the ranges lean to"  # begins a text that is no finding: what it names may be chance
 TYPED_MM = 3.0  # between a stated and a true error of a typed position: rounding, and the telescope's expansion
 TRUE_C = 0.9  # °C: a drawn offset beyond three of its u is no innocent thermometer
 
@@ -56,6 +57,7 @@ class Outcome:
     alarms     these, doubts, and the reason of a verdict that is not good
     errors     None where it was refused
     listed     points listed as unchecked or unmeasured: their independent lines
+    across     the same points: lines within 60° of the direction that has the fewest
     places     points that the night has
     seconds    of the processor
     """
@@ -69,6 +71,7 @@ class Outcome:
     alarms: tuple[str, ...]
     errors: Errors | None
     listed: dict[str, int]
+    across: dict[str, int]
     places: int
     seconds: float
     texts: tuple[str, ...] = field(default=(), repr=False)
@@ -135,6 +138,19 @@ def is_typed_so(text: str, coordinates, truth) -> bool:
     return any(abs(float(told[2]) - each) < TYPED_MM for each in off)
 
 
+def lines_across(name: str, coordinates) -> int:
+    """Number of a point's lines within 60° of the direction that has the fewest of them."""
+    ranges = coordinates.ranges
+    pairs = {(r, t) for r, t, used in zip(ranges.ranger, ranges.target, ranges.used, strict=True) if used}
+    others = sorted({t if r == name else r for r, t in pairs if name in (r, t)} & set(coordinates.points))
+    if name not in coordinates.points or len(others) < 3:
+        return 0
+    towards = coordinates.x[coordinates.rows(others)] - coordinates.x[coordinates.index(name)]
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    weakest = np.linalg.eigh(towards.T @ towards)[1][:, 0]
+    return int(np.count_nonzero(np.abs(towards @ weakest) > 0.5))
+
+
 def outcome(case: Case, adjust=reduce_epoch) -> Outcome:
     """Simulate, reduce and judge one night."""
     night = lying_night(case.seed, case.lies, **case.setting)
@@ -156,6 +172,7 @@ def outcome(case: Case, adjust=reduce_epoch) -> Outcome:
                 alarms=(text,),
                 errors=None,
                 listed={},
+                across={},
                 places=0,
                 seconds=taken,
                 texts=(text,),
@@ -194,6 +211,7 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
         alarms=tuple(dict.fromkeys(alarms)),
         errors=errors,
         listed={n: int(lines.get(n, 0)) for n in sorted(listed)},
+        across={n: lines_across(n, coordinates) for n in sorted(listed)},
         places=len([n for n in coordinates.points if n in coordinates.places]) + len(coordinates.unmeasured),
         seconds=seconds,
         texts=tuple(dict.fromkeys(said)),
@@ -206,7 +224,8 @@ def _word(case: Case, said: list[str], errors: Errors, others: Errors, *, alarme
     others    errors without the points that are listed
     alarmed   whether the verdict is doubtful or candidates are listed
     """
-    hits = [any(re.search(pattern, text) for text in said) for pattern in case.named]
+    found = [text for text in said if not text.startswith(LEANING)]
+    hits = [any(re.search(pattern, text) for text in found) for pattern in case.named]
     within, besides = not errors.far, not others.far
     if case.lies and all(hits) and (besides or not case.covers):
         return NAMED
