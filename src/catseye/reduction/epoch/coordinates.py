@@ -15,7 +15,7 @@ from catseye.errors import InputError
 from catseye.estimation.least_squares.adjustment import (
     GroupFit,
 )
-from catseye.estimation.least_squares.covariance import JointPoints, Widened
+from catseye.estimation.least_squares.covariance import JointPoints
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.allowance import Allowance
 from catseye.reduction.epoch.common_errors import considered
@@ -238,7 +238,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
     tested, is_night = EpochRecords(network, settled.solution, shots), network.motion is None
     leaning = leaning_of(tested) if is_night else None
     if leaning is not None:
-        solution = replace(solution, q=Widened(solution.q, leaning.reach))
+        solution = leaning.considered(solution)
     by_survey = hidden_shifts(tested, solution.q) if is_night else {}
     layout, campaign = network.layout, network.campaign
     doubtful = resolved.doubtful | set(ranges.ill_fitting)
@@ -299,11 +299,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
         fits=solution.fits,
         notes=(
             *record_notes(network, solution, wrong, count),
-            *(
-                [f"the ranges lean to an error of {leaning.text}, as chance may: the uncertainties include it"]
-                if leaning is not None
-                else []
-            ),
+            *([leaning.note] if leaning is not None else []),
             *sound_notes(network, solution, ranges, sound),
             *loss_notes(ranges, independence, network.settings.critical),
             *resolved.notes,
@@ -315,7 +311,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
         doubts=(
             *disagreement,
             *doubts_of(network, solution, wrong, refuted),
-            *(loss_doubts(ranges, independence, campaign.triplet_of) if network.motion is None else ()),
+            *(loss_doubts(ranges, independence, campaign.triplet_of, network.settings.critical) if is_night else ()),
         ),
         refuted=refuted,
         records=records,

@@ -3,13 +3,13 @@
 The answer keeps to the records; what follows for its uncertainty, and for the points that rest on a record, is here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
 
-from catseye.estimation.least_squares.adjustment import NONCENTRALITY
-from catseye.estimation.least_squares.covariance import Covariance
+from catseye.estimation.least_squares.adjustment import NONCENTRALITY, LeastSquaresSolution
+from catseye.estimation.least_squares.covariance import Covariance, Widened
 from catseye.estimation.least_squares.influence import Influence
 from catseye.estimation.least_squares.patterns import PatternTests
 from catseye.reduction.epoch.contradictions.contradiction import RecordGroup
@@ -24,12 +24,24 @@ MOST_TOLD = 6  # errors told that the ranges lean to
 class Leaning:
     """Errors of records that the ranges speak for, but not enough for a contradiction.
 
-    text    of the errors, with their sizes
+    texts   of the errors, with their sizes, likeliest first
     reach   (n, k) shift of the parameters if they are as large as found, and by what they are uncertain
     """
 
-    text: str
+    texts: tuple[str, ...]
     reach: np.ndarray
+
+    @property
+    def note(self) -> str:
+        """Sentence for the user, of the likeliest errors."""
+        told = list(self.texts[:MOST_TOLD])
+        if len(self.texts) > MOST_TOLD:
+            told.append(f"of {len(self.texts) - MOST_TOLD} more")
+        return f"the ranges lean to an error of {'; or '.join(told)}, as chance may: the uncertainties include it"
+
+    def considered(self, solution: LeastSquaresSolution) -> LeastSquaresSolution:
+        """Solution with these errors in its covariance."""
+        return replace(solution, q=Widened(solution.q, self.reach))
 
 
 def leaning_of(records: EpochRecords) -> Leaning | None:
@@ -52,10 +64,8 @@ def leaning_of(records: EpochRecords) -> Leaning | None:
     near.sort(key=lambda pair: -pair[1].score)
     moved = influence.moved(patterns.vectors)
     reach = [moved[:, patterns.columns(i)] @ fit.spread for i, fit in near]
-    told = [explanation_of(hypotheses[i], fit).text for i, fit in near[:MOST_TOLD]]
-    if len(near) > MOST_TOLD:
-        told.append(f"of {len(near) - MOST_TOLD} more")
-    return Leaning("; or ".join(told), np.concatenate(reach, axis=1))
+    texts = tuple(explanation_of(hypotheses[i], fit).text for i, fit in near)
+    return Leaning(texts, np.concatenate(reach, axis=1))
 
 
 def _level(hypothesis: Hypothesis) -> float:

@@ -71,9 +71,9 @@ def loss_notes(ranges: RangeShots, independence: Independence, critical: float) 
         elif not used.all() and name not in independence.doubtful and independence.by_lines(name):
             lines = independence.lines[name]
             unchecked[name] = (
-                f"{name}: {(~used).sum()} of its {len(mine)} shots contradict the rest, and nothing checks the "
-                f"{lines} {'line' if lines == 1 else 'lines'} left: its error may exceed its "
-                "uncertainty; range it again"
+                f"{name}: {(~used).sum()} of its {len(mine)} shots are left out as they contradict others, and nothing "
+                f"checks the {lines} {'line' if lines == 1 else 'lines'} left: its error may exceed its uncertainty; "
+                "range it again"
             )
     notes = [
         *_summarized(
@@ -81,7 +81,7 @@ def loss_notes(ranges: RangeShots, independence: Independence, critical: float) 
         ),
         *_summarized(
             unchecked,
-            "points lost shots that contradict the rest, and the lines left do not check each other: their errors may "
+            "points lost shots that contradict others, and the lines left do not check each other: their errors may "
             "exceed their uncertainties; range them again",
         ),
     ]
@@ -97,16 +97,18 @@ def loss_notes(ranges: RangeShots, independence: Independence, critical: float) 
     return notes
 
 
-def loss_doubts(ranges: RangeShots, independence: Independence, units: Mapping[str, str]) -> list[str]:
+def loss_doubts(ranges: RangeShots, independence: Independence, units: Mapping[str, str], critical: float) -> list[str]:
     """Targets that lost more shots than stray reflections explain, and whose lines left do not check each other.
 
-    units   target of a triplet: the triplet, which is one target here
+    units      target of a triplet: the triplet, which is one target here
+    critical   |w| above which a shot does not fit; others were left out because nothing decides between them
 
     Strays hit each shot with the share that the other targets' shots were lost with, those of rangers most of whose
     shots do not fit aside. What is left of such a target may agree with a wrong typed position alone.
     """
     judged = ~np.isin(ranges.ranger, list(ranges.ill_fitting))
-    lost, fired = int((judged & ~ranges.used).sum()), int(judged.sum())
+    misfits = ~ranges.used & (np.abs(ranges.standardised) > critical)
+    lost, fired = int((judged & misfits).sum()), int(judged.sum())
     targets: dict[str, list[np.ndarray]] = {}
     unchecked = set()
     for name, rows in _by_target(ranges):
@@ -117,7 +119,7 @@ def loss_doubts(ranges: RangeShots, independence: Independence, units: Mapping[s
     doubts = []
     for name in sorted(unchecked):
         mine = np.concatenate(targets[name])
-        own = int((~ranges.used[mine]).sum())
+        own = int(misfits[mine].sum())
         share = (lost - own + 1) / (fired - len(mine) + 2)
         chance = len(targets) * float(binom.sf(own - 1, len(mine), share))
         if 0 < own < len(mine) and chance < BY_CHANCE:

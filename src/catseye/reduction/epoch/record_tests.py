@@ -230,11 +230,11 @@ def _parameter_fit(records: EpochRecords, hypothesis: Hypothesis) -> PatternFit 
     inverse = np.linalg.inv(records.solution.q.within(columns) / np.outer(sigma, sigma))
     values, directions = np.linalg.eigh(inverse - np.eye(len(sigma)))
     used = values > KNOWN
+    seen = directions[:, used] @ directions[:, used].T
     by_data = directions[:, used] / values[used] @ directions[:, used].T
     errors = by_data @ inverse @ (records.solution.x[columns] / sigma)
-    seen = np.sum(directions[:, used] ** 2, axis=1)
-    covariance = (by_data + np.diag(seen)) * np.outer(sigma, sigma)
-    determined = seen > KNOWN
+    covariance = (by_data + seen) * np.outer(sigma, sigma)  # beside a prior as wide
+    determined = np.diag(seen) > KNOWN
     return PatternFit(
         gain=float(errors @ np.linalg.solve(by_data + np.eye(len(sigma)), errors)),
         degrees=int(np.count_nonzero(used)),
