@@ -191,7 +191,7 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
     listed = {*coordinates.unchecked, *coordinates.unmeasured}
     errors, others = errors_of(reduction, truth), errors_of(reduction, truth, listed)
     word = _word(case, said, errors, others, alarmed=reduction.verdict.word != "good" or bool(candidates))
-    common = [f"{r.record} {r.where}" for r in coordinates.records if r.unchecked and r.record.endswith(" alike")]
+    common = [f"{r.record} {r.where}" for r in coordinates.records if r.unchecked and r.in_common]
     if word in (DOUBTFUL, SILENT) and case.lies and all(any(re.search(p, t) for t in common) for p in case.named):
         word = UNCHECKED  # a record of all that the report lists as checked by nothing
     biased = [s for s, value in truth.thermometer_offsets_c.items() if abs(value) > TRUE_C]

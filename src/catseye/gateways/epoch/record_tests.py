@@ -9,6 +9,7 @@ import numpy as np
 from catseye.constants import MILLIMETRE
 from catseye.gateways.writers.columns import Column, Table, each
 from catseye.reduction.epoch.contradictions.contradiction import (
+    ALIKE,
     ClassScatter,
     Contradiction,
     GroupTest,
@@ -271,9 +272,9 @@ def checks_sentences(coordinates: AdjustedCoordinates) -> list[str]:
         sentences.append(f"Unchecked, {why}: {some(coordinates.unchecked)}.")
     hidden = {}
     for test in sorted(coordinates.records, key=lambda t: t.detectable):
-        if test.unchecked and test.record.endswith(" alike"):  # of several parts the least known
+        if test.unchecked and test.in_common:  # of several parts the least known
             size = f"{test.detectable:.2g} {test.unit}" if np.isfinite(test.detectable) else "any size"
-            hidden[test.record.removesuffix(" alike")] = size
+            hidden[test.record.removesuffix(ALIKE)] = size
     if hidden:
         sizes = "; ".join(f"{record} by {size}" for record, size in hidden.items())
         sentences.append(

@@ -7,6 +7,7 @@ import numpy as np
 
 from catseye.estimation.least_squares.adjustment import NONCENTRALITY
 
+ALIKE, FIXED_SURVEY = " alike", " or fixed survey of "  # in names of records that move all points, or all but one
 UNCHECKED_U = 10.0  # stated uncertainties of a record; a larger error that stays hidden leaves the record unchecked
 
 
@@ -66,6 +67,11 @@ class RecordTest:
     def detectable(self) -> float:
         """Smallest error that the test finds four times in five; infinite where nothing tests the record."""
         return NONCENTRALITY * self.u_error
+
+    @property
+    def in_common(self) -> bool:
+        """True for an error that many records share, or of the mirror or monument that holds the datum."""
+        return self.record.endswith(ALIKE) or FIXED_SURVEY in self.record
 
     @property
     def unchecked(self) -> bool:

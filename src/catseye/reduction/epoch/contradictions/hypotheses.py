@@ -5,6 +5,7 @@ ranges at once (the modulation frequency, the pressure, a body that moves). `exp
 parameters; what it finds is allowed for by a wider prior, or by parameters with these slopes.
 """
 
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from catseye.estimation.least_squares.patterns import Patterns
 from catseye.estimation.observations.kinds import Distances, Linear, ObservationGroup
 from catseye.names import megahertz
 from catseye.records.night.campaign import ObservedSite
-from catseye.reduction.epoch.contradictions.contradiction import RecordGroup
+from catseye.reduction.epoch.contradictions.contradiction import ALIKE, FIXED_SURVEY, RecordGroup
 from catseye.reduction.epoch.parameter import XYZ, Parameter, ParameterKind
 from catseye.reduction.epoch.prior_names import (
     BENCHMARKS,
@@ -198,28 +199,34 @@ def prior_hypotheses(
 
     parameters   of the adjustment
     """
-    listing = _Listing(parameters, campaign, places)
+    surveyed = Counter(owner.of for p in priors if p.name == MONUMENTS for owner in owners_of(p, parameters))
+    fixed = frozenset(name for name in campaign.monuments if surveyed[name] < len(XYZ))
+    listing = _Listing(parameters, campaign, places, fixed)
     result = [h for i, prior in enumerate(priors) for h in listing.of_prior(i, prior)]
     thermometers = [(i, p) for i, p in enumerate(priors) if p.name == THERMOMETERS]
     if sum(len(p.observed) for _, p in thermometers) > 1:
         all_rows = {i: (np.arange(len(p.observed)), np.ones((len(p.observed), 1))) for i, p in thermometers}
         where = "weather.csv: temperature_c"
-        result.append(_one(RecordGroup.THERMOMETERS, EVERYTHING, "all thermometers alike", where, all_rows))
+        result.append(_one(RecordGroup.THERMOMETERS, EVERYTHING, f"all thermometers{ALIKE}", where, all_rows))
     heights = [h for h in result if h.key.group is RecordGroup.TRIPLETS]
     if len(heights) > 1:
         balls = {i: rows for h in heights for i, rows in h.priors.items()}
-        title = "heights of all triplets alike"
+        title = f"heights of all triplets{ALIKE}"
         result.append(_one(RecordGroup.TRIPLETS, EVERYTHING, title, "triplets: h_corr_mm", balls))
     return result
 
 
 @dataclass(frozen=True, eq=False)
 class _Listing:
-    """Records behind the rows of priors."""
+    """Records behind the rows of priors.
+
+    fixed   monuments that hold the survey's datum in one direction or all: no prior says so
+    """
 
     parameters: Sequence[Parameter]
     campaign: ObservedSite
     places: Mapping[str, RangedPoint]
+    fixed: Collection[str]
 
     def of_prior(self, i: int, prior: ObservationGroup) -> list[Hypothesis]:
         """Hypotheses of one prior."""
@@ -230,9 +237,10 @@ class _Listing:
         if prior.name == OFFSETS:
             name = self.parameters[int(prior.columns[0])].of
             where = f"mirrors/{self.campaign.mirror_of(name).zp}.toml: dx_mm, dy_mm, dz_mm"
-            return [
-                _place(RecordGroup.OFFSETS, name, f"mirror offset of {name}", where, {i: (np.arange(3), np.eye(3))})
-            ]
+            title = f"mirror offset of {name}"
+            if name in self.fixed:  # an error of the mirror's place is one of the datum
+                title, where = f"mirror offset{FIXED_SURVEY}{name}", f"{where}; monuments/{name}.toml"
+            return [_place(RecordGroup.OFFSETS, name, title, where, {i: (np.arange(3), np.eye(3))})]
         if prior.name == TRIPLET_BALLS:
             return self._triplet(i, prior)
         if isinstance(prior, Distances) and prior.name == BENCHMARKS:

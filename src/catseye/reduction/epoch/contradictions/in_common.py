@@ -11,7 +11,7 @@ import numpy as np
 from catseye.constants import ARCSECOND, MILLIMETRE, PPM
 from catseye.estimation.observations.kinds import ObservationGroup
 from catseye.records.night.campaign import ObservedSite
-from catseye.reduction.epoch.contradictions.contradiction import RecordGroup
+from catseye.reduction.epoch.contradictions.contradiction import ALIKE, RecordGroup
 from catseye.reduction.epoch.contradictions.hypotheses import (
     DIRECTIONS,
     Hypothesis,
@@ -61,7 +61,7 @@ def _alike(
     name, per_unit = unit
     return [
         Hypothesis(
-            key=key, record=f"{of} alike", where=where, parts=parts, unit=name, per_unit=per_unit, priors=dict(priors)
+            key=key, record=f"{of}{ALIKE}", where=where, parts=parts, unit=name, per_unit=per_unit, priors=dict(priors)
         )
     ]
 
