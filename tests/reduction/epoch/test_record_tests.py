@@ -16,8 +16,8 @@ from catseye.reduction.epoch.contradictions.hypotheses import DIRECTIONS, Record
 from catseye.reduction.epoch.contradictions.in_common import DATUM
 from catseye.reduction.epoch.coordinates import adjust_coordinates, settled_network
 from catseye.reduction.epoch.epoch import reduce_epoch
-from catseye.reduction.epoch.hidden_errors import hidden_shifts
 from catseye.reduction.epoch.lines.cycles import without_shots
+from catseye.reduction.epoch.lines.hidden_errors import hidden_shifts
 from catseye.reduction.epoch.record_tests import EpochRecords, record_tests
 from catseye.reduction.epoch.settling import SettledNetwork, iterate_adjustment, selection_of
 from catseye.reduction.epoch.unknowns import rebuilt

@@ -21,10 +21,10 @@ from catseye.reduction.epoch.allowance import Allowance
 from catseye.reduction.epoch.common_errors import considered
 from catseye.reduction.epoch.contradictions.contradiction import ClassScatter, Contradiction, GroupTest, RecordTest
 from catseye.reduction.epoch.head import head_unknowns
-from catseye.reduction.epoch.hidden_errors import hidden_shifts, leaning_of
 from catseye.reduction.epoch.lines.cycles import Resolved, resolve_cycles, without_shots
 from catseye.reduction.epoch.lines.frequency_cycles import FrequencyCycles
 from catseye.reduction.epoch.lines.frequency_places import PlacedCampaign, placed_by_frequencies
+from catseye.reduction.epoch.lines.hidden_errors import hidden_shifts, leaning_of
 from catseye.reduction.epoch.lines.independence import independence_of
 from catseye.reduction.epoch.lines.line_tests import line_tests
 from catseye.reduction.epoch.lines.mistyped import with_mistyped_found

@@ -61,7 +61,7 @@ LARGEST = {  # errors beyond which an explanation is impossible, in the unit of 
     RecordGroup.LEAKAGE: 200.0,  # mV: a tenth of a usual return
     RecordGroup.MOVEMENTS: 20.0,  # mm/h: a telescope that is driven moves faster, pillars and steel do not
 }
-KNOWN = 1e-3  # information of the data over a prior's, below which they say nothing of a parameter
+LEAST_INFORMATION = 1e-3  # information of the data over a prior's, below which they say nothing of a parameter
 LARGEST_GROUP = 300  # records tested together; of more, as of glass constants, each is tested alone
 
 
@@ -229,12 +229,12 @@ def _parameter_fit(records: EpochRecords, hypothesis: Hypothesis) -> PatternFit 
     columns = records.network.layout.columns(parameter_of(hypothesis.key), len(sigma))
     inverse = np.linalg.inv(records.solution.q.within(columns) / np.outer(sigma, sigma))
     values, directions = np.linalg.eigh(inverse - np.eye(len(sigma)))
-    used = values > KNOWN
-    seen = directions[:, used] @ directions[:, used].T
+    used = values > LEAST_INFORMATION
+    projector = directions[:, used] @ directions[:, used].T
     by_data = directions[:, used] / values[used] @ directions[:, used].T
     errors = by_data @ inverse @ (records.solution.x[columns] / sigma)
-    covariance = (by_data + seen) * np.outer(sigma, sigma)  # beside a prior as wide
-    determined = np.diag(seen) > KNOWN
+    covariance = (by_data + projector) * np.outer(sigma, sigma)  # beside a prior as wide
+    determined = np.diag(projector) > LEAST_INFORMATION
     return PatternFit(
         gain=float(errors @ np.linalg.solve(by_data + np.eye(len(sigma)), errors)),
         degrees=int(np.count_nonzero(used)),

@@ -34,10 +34,10 @@ class Leaning:
     @property
     def note(self) -> str:
         """Sentence for the user, of the likeliest errors."""
-        told = list(self.texts[:MOST_TOLD])
+        texts = list(self.texts[:MOST_TOLD])
         if len(self.texts) > MOST_TOLD:
-            told.append(f"of {len(self.texts) - MOST_TOLD} more")
-        return f"the ranges lean to an error of {'; or '.join(told)}, as chance may: the uncertainties include it"
+            texts.append(f"of {len(self.texts) - MOST_TOLD} more")
+        return f"the ranges lean to an error of {'; or '.join(texts)}, as chance may: the uncertainties include it"
 
     def considered(self, solution: LeastSquaresSolution) -> LeastSquaresSolution:
         """Solution with these errors in its covariance."""
