@@ -6,10 +6,13 @@ from hostile.run import cases, outcomes, row_of
 
 MANY = {TWO: 40 / 9, HONEST: 200 / 9}  # times as many nights as of the others: with 9, 400 and 200
 
+APART = 100  # seeds from a row's first to the next row's; the last row has more
+
 
 def nights_of(name, count):
-    """Nights of a row: its sizes by turns."""
-    return cases([name], range(UNTRIED_SEED, UNTRIED_SEED + round(count * MANY.get(name, 1))), cycle=True)
+    """Nights of a row: its sizes by turns, each night with a nature of its own."""
+    first = UNTRIED_SEED + APART * NAMES.index(name)
+    return cases([name], range(first, first + round(count * MANY.get(name, 1))), cycle=True)
 
 
 def measured(count, say, jobs):
