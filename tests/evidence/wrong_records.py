@@ -5,7 +5,6 @@ from hostile.rows import HONEST, NAMES, TWO, UNTRIED_SEED, sizes_of, unit_of
 from hostile.run import cases, outcomes, row_of
 
 MANY = {TWO: 40 / 9, HONEST: 200 / 9}  # times as many nights as of the others: with 9, 400 and 200
-
 APART = 100  # seeds from a row's first to the next row's; the last row has more
 
 
