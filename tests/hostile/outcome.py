@@ -24,7 +24,7 @@ ACCUSING = re.compile(
     r"thermometer is biased by|'s zero is not the sheet's|: its typed position is|: not the mirror sheet's"
     r"|'s is wrong, or its elevation|more likely its survey, mirror sheet or samples"
 )
-LEANING = "the ranges lean to"  # begins a text that is no finding: what it names may be chance
+UNSURE = ("the ranges lean to", "the stations differ by")  # begin texts that are no finding: honest nights have them
 TYPED_MM = 3.0  # between a stated and a true error of a typed position: rounding, and the telescope's expansion
 TRUE_C = 0.9  # °C: a drawn offset beyond three of its u is no innocent thermometer
 
@@ -224,7 +224,7 @@ def _word(case: Case, said: list[str], errors: Errors, others: Errors, *, alarme
     others    errors without the points that are listed
     alarmed   whether the verdict is doubtful or candidates are listed
     """
-    found = [text for text in said if not text.startswith(LEANING)]
+    found = [text for text in said if not text.startswith(UNSURE)]
     hits = [any(re.search(pattern, text) for text in found) for pattern in case.named]
     within, besides = not errors.far, not others.far
     if case.lies and all(hits) and (besides or not case.covers):

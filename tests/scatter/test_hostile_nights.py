@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from hostile.outcome import COVERED, DOUBTFUL, LEANING, MOST, NAMED, RARE, SILENT, UNCHECKED, outcome, rarity
+from hostile.outcome import COVERED, DOUBTFUL, MOST, NAMED, RARE, SILENT, UNCHECKED, UNSURE, outcome, rarity
 from hostile.rows import FIRST_SEED, HONEST, SINGLES, TWO, case
 from hostile.run import cases, outcomes, row_of
 
@@ -117,7 +117,7 @@ def test_no_words_of_honest_nights_name_a_lie(honest):
     for o in honest:
         for name in SINGLES:
             wrong = case(name, o.case.seed, 1.0)
-            found = [text for text in o.texts if not text.startswith(LEANING)]
+            found = [text for text in o.texts if not text.startswith(UNSURE)]
             said = [text for text in found for pattern in wrong.named if re.search(pattern, text)]
             assert not said, f"{o.case.seed}, {name}: {said}"
 
