@@ -24,7 +24,7 @@ ACCUSING = re.compile(
     r"thermometer is biased by|'s zero is not the sheet's|: its typed position is|: not the mirror sheet's"
     r"|'s is wrong, or its elevation|more likely its survey, mirror sheet or samples"
 )
-UNSURE = ("the ranges lean to", "the stations differ by")  # begin texts that are no finding: honest nights have them
+UNSURE = ("the ranges lean to", "the stations differ by")  # begin texts that are a finding only where they are doubts
 TYPED_MM = 3.0  # between a stated and a true error of a typed position: rounding, and the telescope's expansion
 TRUE_C = 0.9  # °C: a drawn offset beyond three of its u is no innocent thermometer
 
@@ -185,7 +185,8 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
     coordinates = reduction.coordinates
     notes, candidates, alone = texts_of(reduction)
     shots = dict(zip(reduction.campaign.shots.shot.tolist(), reduction.campaign.shots.ranger, strict=True))
-    said = [*notes, *candidates]
+    doubts = {*coordinates.doubts, reduction.verdict.why}
+    said = [text for text in (*notes, *candidates) if text in doubts or not text.startswith(UNSURE)]
     if case.shots:
         said += [f"{shots[shot]}: {reason}" for shot, reason in reduction.rejected.items()]
     listed = {*coordinates.unchecked, *coordinates.unmeasured}
@@ -214,7 +215,7 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
         across={n: lines_across(n, coordinates) for n in sorted(listed)},
         places=len([n for n in coordinates.points if n in coordinates.places]) + len(coordinates.unmeasured),
         seconds=seconds,
-        texts=tuple(dict.fromkeys(said)),
+        texts=tuple(dict.fromkeys((*said, *notes))),
     )
 
 
@@ -224,8 +225,7 @@ def _word(case: Case, said: list[str], errors: Errors, others: Errors, *, alarme
     others    errors without the points that are listed
     alarmed   whether the verdict is doubtful or candidates are listed
     """
-    found = [text for text in said if not text.startswith(UNSURE)]
-    hits = [any(re.search(pattern, text) for text in found) for pattern in case.named]
+    hits = [any(re.search(pattern, text) for text in said) for pattern in case.named]
     within, besides = not errors.far, not others.far
     if case.lies and all(hits) and (besides or not case.covers):
         return NAMED
