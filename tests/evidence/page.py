@@ -61,11 +61,8 @@ def records_text(data):
     body = []
     for r in rows:
         sizes = ", ".join(f"{size:g}" for size in r["sizes"] if size)
-        square = (
-            ""
-            if r["mean_square"] is None
-            else f"{r['mean_square']:.1f}, {TITLES.get(r['worst_class'], r['worst_class'])}"
-        )
+        kind = TITLES.get(r["worst_class"], r["worst_class"])
+        square = "" if r["mean_square"] is None else f"{r['mean_square']:.1f}, {kind}"
         counts = [str(r[key] or "") for key in ("nights", *OUTCOMES, "accused")]
         body.append([r["row"], f"{sizes} {r['unit']}".strip(), *counts, square])
     sums = {key: sum(r[key] for r in rows) for key in ("nights", *OUTCOMES, "accused", "refused")}

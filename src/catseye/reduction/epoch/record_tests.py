@@ -266,6 +266,7 @@ def is_possible(hypothesis: Hypothesis, fit: PatternFit) -> bool:
 
 
 def explanation_of(hypothesis: Hypothesis, fit: PatternFit) -> RecordError:
+    """Error of a record by a fit, in the record's units; parts that the fit does not determine are left out."""
     determined = np.isfinite(fit.u)
     return RecordError(
         group=hypothesis.key.group,

@@ -80,8 +80,8 @@ def hidden_shifts(records: EpochRecords, claimed: Covariance) -> dict[str, float
 
     claimed   covariance of the parameters, with all errors that their uncertainties include
 
-    Infinite where no range tests a direction of the survey. Of all errors e of a survey with e'M e = 1, those found
-    alike, the one that moves the point most is taken.
+    Infinite for the ranger of a survey of which no range tests a direction. Of all errors e of a survey with
+    e'M e = 1, those found alike, the one that moves the point most is taken.
 
     Source: [BAARDA68], external reliability.
     """

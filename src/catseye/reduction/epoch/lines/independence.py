@@ -21,7 +21,7 @@ from catseye.reduction.epoch.unknowns import CampaignNetwork
 
 HARDLY_CHECKED = 0.1  # redundancy of a survey, below which its errors hardly show [FOERSTNER16]
 LARGEST_SHIFT = NONCENTRALITY * (1.0 / UNCHECKED - 1.0) ** 0.5  # of a point, in its u: an error that nothing tests
-LARGEST_BY_SURVEY = NONCENTRALITY * (1.0 / HARDLY_CHECKED - 1.0) ** 0.5
+LARGEST_BY_SURVEY = NONCENTRALITY * (1.0 / HARDLY_CHECKED - 1.0) ** 0.5  # the same of a survey's error
 
 
 @dataclass(frozen=True, eq=False)
