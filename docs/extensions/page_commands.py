@@ -24,6 +24,7 @@ if __name__ == "__main__":  # not where its processes load it again
     run()
 """
 LONGEST = 300.0  # s that one command may take
+READER_LEFT = 128 + signal.SIGPIPE  # of `grep ... | head -1`, when head ends first: 0 in a shell without pipefail
 ANSI = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)|[@-Z\\-_])")
 PROGRESS = re.compile(  # lines of a slow machine: "reducing nights 1 of 2, 10 s, some 10 s left", "adjusting 20"
     r"(?m)^(?:[a-z][^\n:]* \d+(?: of \d+)?(?:, for [^\n]+|, [^\n]+ left)|adjusting \d+)(?:\n|$)"
@@ -146,7 +147,8 @@ class PageDirectory:
             os.killpg(process.pid, signal.SIGKILL)
             printed, _ = process.communicate()
             return Outcome(-signal.SIGKILL, f"{self._shown(printed)}\n(stopped after {longest_s:g} s)".strip())
-        return Outcome(process.returncode, self._shown(printed))
+        status = 0 if process.returncode == READER_LEFT else process.returncode
+        return Outcome(status, self._shown(printed))
 
     def close(self) -> None:
         """Remove the directory."""

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from docs.site_scene import build
-from page_commands import PageDirectory, blocks_of, commands_of
+from page_commands import Outcome, PageDirectory, blocks_of, commands_of
 
 EXTENSIONS = ("command_line",)
 DOT = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"><circle r="4"/></svg>'
@@ -52,6 +52,15 @@ def test_commands_run_in_order_and_are_shown_with_their_output(tmp_path):
     assert "$ seq 5\n1\n2\n3\n4\n5\n" in text
     assert "$ seq 4 \\\n    8\n4\n5\n...\n" in text
     assert (tmp_path / "html" / "_images" / "dot.svg").read_text(encoding="utf-8").strip() == DOT
+
+
+def test_a_reader_that_leaves_early_is_no_failure():
+    page = PageDirectory()
+    try:
+        assert page.run("yes | head -1") == Outcome(0, "y")
+        assert page.run("exit 3 | head -1").status == 3
+    finally:
+        page.close()
 
 
 @pytest.mark.parametrize(
