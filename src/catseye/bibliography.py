@@ -362,6 +362,11 @@ SOURCES: dict[str, Source] = {
         locator="doi:10.1093/biomet/58.3.545",
         used="restricted maximum likelihood and its information",
     ),
+    "HAUSMAN78": Source(
+        title="J. A. Hausman, Specification tests in econometrics, 1978",
+        locator="doi:10.2307/1913827",
+        used="lemma 2.1: two least squares of which one has more data differ by the difference of their covariances",
+    ),
     "WORSLEY82": Source(
         title="K. J. Worsley, An improved Bonferroni inequality and applications, 1982",
         locator="doi:10.1093/biomet/69.2.297",

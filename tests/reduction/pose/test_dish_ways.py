@@ -51,7 +51,7 @@ def test_every_estimate_follows_a_known_turn_of_the_dish(ways, reduced_night_01)
     coordinates = reduced_night_01.coordinates
     vertex, rotation = nominal_frame(reduced_night_01.campaign).translation, from_vector(turn)
     moved = replace(coordinates, x=vertex + (coordinates.x - vertex) @ rotation.T)
-    surface, _ = fit_surface(reduced_night_01.campaign, moved)
+    surface, _ = fit_surface(reduced_night_01.campaign, moved, u_surface=1e-3)
     after = {way.command: way for way in dish_ways(replace(reduced_night_01, coordinates=moved, surface=surface))}
     posture = np.radians(
         [getattr(reduced_night_01.campaign.site.campaign, f"{n}_deg") for n in ("azimuth", "elevation")]

@@ -1,13 +1,14 @@
 """Best-fit paraboloid of points: pose, focal length and deviation of every point."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from catseye.errors import EstimationError
+from catseye.estimation.shapes.surface_field import Roughness
 from catseye.geometry.frames.frame import Transform
 from catseye.geometry.frames.rotation import from_vector, skew
 
@@ -163,6 +164,43 @@ def fit_paraboloid(
         design=design,
         gain=gain,
         along=along,
+    )
+
+
+def covering_others(
+    fit: ParaboloidFit, others: np.ndarray, nominal: Transform, *, roughness: Roughness
+) -> ParaboloidFit:
+    """Fit with the covariance of the paraboloid through its points and others, which were not measured.
+
+    fit         with equal weights of the normal deviations
+    others      (m, 2) m, x and y in the fitted paraboloid's frame
+    nominal     outer frame from the nominal paraboloid's, as in the fit
+    roughness   of the surface's own deviations
+
+    With the gain G of all points and g of the measured ones, 0 at the others, the parameters of all differ from the
+    fitted ones by H d of the deviations d, H = G - g, whatever the paraboloid, as H A = 0: their covariance is H K H',
+    K that of d. For independent deviations of variance s^2 this is s^2 ((A'A)^-1 of the measured less that of all).
+
+    Raises EstimationError as `fit_paraboloid`. Source: for independent deviations [HAUSMAN78] lemma 2.1; for correlated
+    ones derived here.
+    """
+    if not len(others):
+        return fit
+    k = len(fit.local)
+    places = np.concatenate([fit.local[:, :2], others])
+    design = np.concatenate([fit.design, design_rows(fit, others, nominal)])
+    difference = _gain(design, np.ones((len(places), 1)), len(places))
+    difference[:, :k] -= fit.gain
+    smooth = difference @ roughness.covariance(places, places) @ difference.T
+    added = smooth + roughness.own**2 * difference @ difference.T
+    expansion = _expansion(fit.free, nominal.rotation[:, :2])
+    parameters = fit.parameter_covariance + added
+    return replace(
+        fit,
+        covariance=fit.covariance + expansion @ added @ expansion.T,
+        deviation_covariance=fit.deviation_covariance + fit.design @ added @ fit.design.T,
+        u_focal_length=float(np.sqrt(parameters[-1, -1])) if "focal-length" in fit.free else 0.0,
+        parameter_covariance=parameters,
     )
 
 

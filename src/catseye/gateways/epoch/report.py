@@ -89,7 +89,7 @@ def _cards(reduction: Reduction) -> list[Card]:
         u = float(np.median(surface.u_deviation)) / MILLIMETRE
         tilt = float(np.linalg.norm(surface.fit.rotation)) / ARCSECOND
         moved = float(np.linalg.norm(surface.fit.translation)) / MILLIMETRE
-        prisms = f"{len(surface.names)} prisms, u {u:.3f} mm each"
+        prisms = f"{surface.count_text}, u {u:.3f} mm each"
         cards += [
             Card("Surface", f"{surface.rms / MILLIMETRE:.3f} mm rms", prisms),
             Card("Dish off nominal", f"{moved:.1f} mm, {tilt:.1f}″", "shift of the vertex, tilt of the axis"),
@@ -151,7 +151,7 @@ def _dish(reduction: Reduction) -> ReportSection:
         "Dish",
         [
             Text(
-                f"The paraboloid of {surface.focal_length:g} m focal length that fits {len(surface.names)} prisms best "
+                f"The paraboloid of {surface.focal_length:g} m focal length that fits {surface.count_text} best "
                 f"(least squares of the normal residuals) points to azimuth {aim[0]:.4f}°, elevation {aim[1]:.4f}°; "
                 f"the encoders read {posture.azimuth_deg:g}° and {posture.elevation_deg:g}°. Frame: ground."
             ),

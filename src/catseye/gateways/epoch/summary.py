@@ -116,7 +116,7 @@ def _dish(reduction: Reduction) -> str:
     aim = pointing(reduction)
     assert aim is not None
     return (
-        f"{len(surface.names)} prisms lie on a paraboloid of {surface.focal_length:g} m focal length to "
+        f"{surface.count_text} lie on a paraboloid of {surface.focal_length:g} m focal length to "
         f"{surface.rms / MILLIMETRE:.3f} mm rms. Against the nominal posture its vertex is at "
         f"{shift[0]:+.2f}, {shift[1]:+.2f}, {shift[2]:+.2f} mm east, north, up "
         f"(u {', '.join(f'{sigma / MILLIMETRE:.2f}' for sigma in u[:3])}) and it is turned by "

@@ -103,7 +103,7 @@ def reduce_epoch(
         electronics, wrong = follow_electronics(campaign, phases, settings.dense_shots)
         refuse_fatal(posture_by_ranges(campaign, phases, electronics))
         coordinates = adjusted(campaign, phases, electronics, settings=settings, progress=progress)
-        surface, missing = fit_surface(campaign, coordinates)
+        surface, missing = fit_surface(campaign, coordinates, u_surface=settings.u_surface)
         coordinates = replace(coordinates, doubts=(*coordinates.doubts, *surface_doubts(surface)))
         remainder = _third_order(typed, coordinates, settings)
     reasons = {k: reason for k, reason in enumerate(phases.reason) if reason} | wrong | coordinates.unresolved

@@ -11,7 +11,14 @@ import numpy as np
 
 from catseye.constants import MILLIMETRE
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.paraboloid import POSE, ParaboloidFit, fit_paraboloid, place_paraboloid
+from catseye.estimation.shapes.paraboloid import (
+    POSE,
+    ParaboloidFit,
+    covering_others,
+    fit_paraboloid,
+    place_paraboloid,
+)
+from catseye.estimation.shapes.surface_field import SPARE, Roughness, estimate_roughness
 from catseye.geometry.frames.frame import Transform
 from catseye.records.night.campaign import ObservedSite
 from catseye.reduction.epoch.coordinates import AdjustedCoordinates
@@ -52,7 +59,8 @@ class DishFit:
     """Fit of the dish prisms.
 
     names          of the prisms, in order
-    fit            the paraboloid and the deviations
+    fit            the paraboloid and the deviations; its covariance is of the paraboloid through all dish prisms
+    others         dish prisms of the site that did not take part
     focal_length   m, as designed, fixed
     pivot          (3,) m, ground frame: the nominal vertex, about which the rotation turns
     unchecked      prisms of these that an error of one of their lines would move unseen; () where there are enough
@@ -65,9 +73,16 @@ class DishFit:
     fit: ParaboloidFit
     focal_length: float
     pivot: np.ndarray
+    others: tuple[str, ...] = ()
     unchecked: tuple[str, ...] = ()
     outlying: Mapping[str, float] = field(default_factory=dict)
     other_focus: float = 0.0
+
+    @property
+    def count_text(self) -> str:
+        """Number of its prisms, for the user; "45 of 60 prisms" where some did not take part."""
+        all_prisms = f" of {len(self.names) + len(self.others)}" if self.others else ""
+        return f"{len(self.names)}{all_prisms} prisms"
 
     @property
     def rms(self) -> float:
@@ -100,24 +115,31 @@ class DishFit:
         }
 
 
-def fit_surface(campaign: ObservedSite, coordinates: AdjustedCoordinates) -> tuple[DishFit | None, str]:
+def fit_surface(
+    campaign: ObservedSite, coordinates: AdjustedCoordinates, *, u_surface: float
+) -> tuple[DishFit | None, str]:
     """Dish from its prisms, or the reason that there is none.
 
     Single prisms of the reflector frame; the reason is "" where there is a fit.
 
+    u_surface   m, scatter of prisms along the normal, where too few took part to show it
+
     A prism takes part if its lines check each other. Where that leaves too few for a fit, all with three lines do, and
-    `unchecked` names those that nothing checks.
+    `unchecked` names those that nothing checks. The surface's deviations at prisms that do not take part are unknown:
+    the covariance includes by how much the paraboloid through all may differ.
     """
     lines = dict(zip(coordinates.points, coordinates.lines.tolist(), strict=True))
     ranged = tuple(name for name in dish_prisms(campaign) if lines.get(name, 0) >= FEWEST_LINES)
     doubtful = frozenset(coordinates.unchecked)
     checked = tuple(name for name in ranged if name not in doubtful)
-    fit, missing = _fit(campaign, coordinates, checked)
-    return (fit, missing) if fit is not None or len(ranged) == len(checked) else _fit(campaign, coordinates, ranged)
+    fit, missing = _fit(campaign, coordinates, checked, u_surface)
+    if fit is not None or len(ranged) == len(checked):
+        return fit, missing
+    return _fit(campaign, coordinates, ranged, u_surface)
 
 
 def _fit(
-    campaign: ObservedSite, coordinates: AdjustedCoordinates, names: tuple[str, ...]
+    campaign: ObservedSite, coordinates: AdjustedCoordinates, names: tuple[str, ...], u_surface: float
 ) -> tuple[DishFit | None, str]:
     """Dish through some prisms, or the reason that there is none."""
     nominal = nominal_frame(campaign)
@@ -135,16 +157,26 @@ def _fit(
     unchecked = tuple(name for name in names if name in coordinates.unchecked)
     outlying = _outlying(names, coordinates.x[rows], nominal, focal_length=focal_length)
     other = 0.0 if outlying else _other_focus(coordinates.x[rows], fit, nominal)
+    others = tuple(name for name in dish_prisms(campaign) if name not in names)
+    typed = np.array([campaign.targets[name].position_mm[:2] for name in others]).reshape(-1, 2) * MILLIMETRE
     found = DishFit(
         names=names,
-        fit=fit,
+        fit=covering_others(fit, typed, nominal, roughness=_roughness(fit, u_surface)) if others else fit,
         focal_length=focal_length,
         pivot=nominal.translation,
+        others=others,
         unchecked=unchecked,
         outlying=outlying,
         other_focus=other,
     )
     return found, ""
+
+
+def _roughness(fit: ParaboloidFit, u_surface: float) -> Roughness:
+    """Deviations of the surface by the prisms of a fit; as assumed and independent, where they are too few."""
+    if len(fit.deviation) < fit.design.shape[1] + SPARE:
+        return Roughness(smooth=0.0, length=1.0, own=u_surface)
+    return estimate_roughness(fit.local[:, :2], fit.deviation, fit.along, trend=fit.design)
 
 
 def _outlying(
@@ -197,6 +229,11 @@ def surface_notes(surface: DishFit | None) -> list[str]:
     if surface is None:
         return []
     notes = []
+    if len(surface.others) >= len(surface.names):
+        notes.append(
+            f"surface and pose follow from {surface.count_text} of the dish: their uncertainties include how much the "
+            "surface may deviate at the others"
+        )
     if surface.other_focus:
         notes.append(
             f"the prisms fit a focal length of {surface.other_focus / MILLIMETRE:.1f} mm {OTHER_FOCUS:g} times as well "
