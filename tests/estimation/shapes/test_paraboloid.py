@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from catseye.errors import EstimationError
-from catseye.estimation.shapes.paraboloid import ParaboloidStatus, covering_others, fit_paraboloid
+from catseye.estimation.shapes.paraboloid import ParaboloidStatus, fit_paraboloid, with_missing_points
 from catseye.estimation.shapes.surface_field import Roughness, estimate_roughness
 from catseye.geometry.frames.frame import Transform
 from draws import draws, same_sigmas
@@ -185,7 +185,7 @@ def test_points_that_are_missing_move_the_paraboloid_as_claimed(missing, trials)
         of_all = fit_paraboloid(points, covariance, OUTER, focal_length=F)
         fit = fit_paraboloid(points[seen], covariance[seen], OUTER, focal_length=F)
         roughness = estimate_roughness(fit.local[:, :2], fit.deviation, fit.along, trend=fit.design)
-        covering = covering_others(fit, local[order[45:], :2], OUTER, roughness=roughness)
+        covering = with_missing_points(fit, local[order[45:], :2], OUTER, roughness=roughness)
         error = motion(covering) - motion(of_all)
         squares.append(error @ np.linalg.solve(covering.parameter_covariance, error) / 5.0)
     # 1.1 and 1.3 over 600 trials, as 45 points hardly determine a correlation length
@@ -197,7 +197,7 @@ def test_missing_points_add_the_difference_of_two_least_squares_covariances():
     local = surface(rng, k=30)
     fit = fit_paraboloid(OUTER.points(local[:20]), zero(20), OUTER, focal_length=F)
     own = 3e-4
-    covering = covering_others(fit, local[20:, :2], OUTER, roughness=Roughness(smooth=0.0, length=1.0, own=own))
+    covering = with_missing_points(fit, local[20:, :2], OUTER, roughness=Roughness(smooth=0.0, length=1.0, own=own))
     design = fit_paraboloid(OUTER.points(local), zero(30), OUTER, focal_length=F).design
     few, many = (own**2 * np.linalg.inv(a.T @ a) for a in (design[:20], design))
     np.testing.assert_allclose(covering.parameter_covariance, few - many, rtol=1e-6, atol=1e-9 * np.abs(few).max())
@@ -206,7 +206,8 @@ def test_missing_points_add_the_difference_of_two_least_squares_covariances():
     np.testing.assert_allclose(
         covering.deviation_covariance, design[:20] @ (few - many) @ design[:20].T, rtol=1e-6, atol=1e-15
     )
-    assert covering_others(fit, np.zeros((0, 2)), OUTER, roughness=Roughness(0.0, 1.0, own)) is fit
+    none = with_missing_points(fit, np.zeros((0, 2)), OUTER, roughness=Roughness(0.0, 1.0, own))
+    np.testing.assert_allclose(none.covariance, 0.0, atol=1e-20)
 
 
 def test_the_deviations_of_five_points_vanish_and_are_certain():

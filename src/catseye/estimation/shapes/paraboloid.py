@@ -167,28 +167,26 @@ def fit_paraboloid(
     )
 
 
-def covering_others(
-    fit: ParaboloidFit, others: np.ndarray, nominal: Transform, *, roughness: Roughness
+def with_missing_points(
+    fit: ParaboloidFit, missing: np.ndarray, nominal: Transform, *, roughness: Roughness
 ) -> ParaboloidFit:
-    """Fit with the covariance of the paraboloid through its points and others, which were not measured.
+    """Fit with the covariance of the paraboloid through its points and missing ones.
 
     fit         with equal weights of the normal deviations
-    others      (m, 2) m, x and y in the fitted paraboloid's frame
+    missing     (m, 2) m, x and y in the fitted paraboloid's frame
     nominal     outer frame from the nominal paraboloid's, as in the fit
     roughness   of the surface's own deviations
 
-    With the gain G of all points and g of the measured ones, 0 at the others, the parameters of all differ from the
-    fitted ones by H d of the deviations d, H = G - g, whatever the paraboloid, as H A = 0: their covariance is H K H',
-    K that of d. For independent deviations of variance s^2 this is s^2 ((A'A)^-1 of the measured less that of all).
+    Of the deviations d at all points, the parameters of all are G d and the fitted ones g d, g 0 at the missing points.
+    They differ by H d, H = G - g, wherever the paraboloid is, as H A = 0 of the design A; K being the covariance of d,
+    the difference has H K H'. For independent d of variance s^2: s^2 ((A'A)^-1 of the measured less that of all).
 
     Raises EstimationError as `fit_paraboloid`. Source: for independent deviations [HAUSMAN78] lemma 2.1; for correlated
     ones derived here.
     """
-    if not len(others):
-        return fit
     k = len(fit.local)
-    places = np.concatenate([fit.local[:, :2], others])
-    design = np.concatenate([fit.design, design_rows(fit, others, nominal)])
+    places = np.concatenate([fit.local[:, :2], missing])
+    design = np.concatenate([fit.design, design_rows(fit, missing, nominal)])
     difference = _gain(design, np.ones((len(places), 1)), len(places))
     difference[:, :k] -= fit.gain
     smooth = difference @ roughness.covariance(places, places) @ difference.T

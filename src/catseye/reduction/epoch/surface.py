@@ -14,9 +14,9 @@ from catseye.errors import EstimationError
 from catseye.estimation.shapes.paraboloid import (
     POSE,
     ParaboloidFit,
-    covering_others,
     fit_paraboloid,
     place_paraboloid,
+    with_missing_points,
 )
 from catseye.estimation.shapes.surface_field import SPARE, Roughness, estimate_roughness
 from catseye.geometry.frames.frame import Transform
@@ -60,7 +60,7 @@ class DishFit:
 
     names          of the prisms, in order
     fit            the paraboloid and the deviations; its covariance is of the paraboloid through all dish prisms
-    others         dish prisms of the site that did not take part
+    missing        dish prisms of the site that did not take part
     focal_length   m, as designed, fixed
     pivot          (3,) m, ground frame: the nominal vertex, about which the rotation turns
     unchecked      prisms of these that an error of one of their lines would move unseen; () where there are enough
@@ -73,7 +73,7 @@ class DishFit:
     fit: ParaboloidFit
     focal_length: float
     pivot: np.ndarray
-    others: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
     unchecked: tuple[str, ...] = ()
     outlying: Mapping[str, float] = field(default_factory=dict)
     other_focus: float = 0.0
@@ -81,7 +81,7 @@ class DishFit:
     @property
     def count_text(self) -> str:
         """Number of its prisms, for the user; "45 of 60 prisms" where some did not take part."""
-        all_prisms = f" of {len(self.names) + len(self.others)}" if self.others else ""
+        all_prisms = f" of {len(self.names) + len(self.missing)}" if self.missing else ""
         return f"{len(self.names)}{all_prisms} prisms"
 
     @property
@@ -132,9 +132,9 @@ def fit_surface(
     ranged = tuple(name for name in dish_prisms(campaign) if lines.get(name, 0) >= FEWEST_LINES)
     doubtful = frozenset(coordinates.unchecked)
     checked = tuple(name for name in ranged if name not in doubtful)
-    fit, missing = _fit(campaign, coordinates, checked, u_surface)
+    fit, reason = _fit(campaign, coordinates, checked, u_surface)
     if fit is not None or len(ranged) == len(checked):
-        return fit, missing
+        return fit, reason
     return _fit(campaign, coordinates, ranged, u_surface)
 
 
@@ -157,14 +157,14 @@ def _fit(
     unchecked = tuple(name for name in names if name in coordinates.unchecked)
     outlying = _outlying(names, coordinates.x[rows], nominal, focal_length=focal_length)
     other = 0.0 if outlying else _other_focus(coordinates.x[rows], fit, nominal)
-    others = tuple(name for name in dish_prisms(campaign) if name not in names)
-    typed = np.array([campaign.targets[name].position_mm[:2] for name in others]).reshape(-1, 2) * MILLIMETRE
+    missing = tuple(sorted(set(dish_prisms(campaign)).difference(names)))
+    typed = np.array([campaign.targets[name].position_mm[:2] for name in missing]).reshape(-1, 2) * MILLIMETRE
     found = DishFit(
         names=names,
-        fit=covering_others(fit, typed, nominal, roughness=_roughness(fit, u_surface)) if others else fit,
+        fit=with_missing_points(fit, typed, nominal, roughness=_roughness(fit, u_surface)) if missing else fit,
         focal_length=focal_length,
         pivot=nominal.translation,
-        others=others,
+        missing=missing,
         unchecked=unchecked,
         outlying=outlying,
         other_focus=other,
@@ -229,7 +229,7 @@ def surface_notes(surface: DishFit | None) -> list[str]:
     if surface is None:
         return []
     notes = []
-    if len(surface.others) >= len(surface.names):
+    if len(surface.missing) >= len(surface.names):
         notes.append(
             f"surface and pose follow from {surface.count_text} of the dish: their uncertainties include how much the "
             "surface may deviate at the others"

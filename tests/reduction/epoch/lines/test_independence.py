@@ -44,12 +44,12 @@ def test_benchmarks_with_a_second_line_and_a_ranger_in_one_plane_are_unchecked_i
 def test_the_pose_of_half_of_a_dish_allows_for_the_other_half(reduced_night_01, side):
     """Half of night-01's prisms unchecked, against all: the vertex is up to 12 mm off, over 15 mean squares before."""
     r, whole = reduced_night_01, reduced_night_01.surface
-    assert whole.others == ()
+    assert whole.missing == ()
     far = whole.fit.local[:, :2] @ np.array(side)
     hidden = tuple(np.array(whole.names)[far > np.median(far)].tolist())
     coordinates = replace(r.coordinates, unchecked=(*r.coordinates.unchecked, *hidden))
     half, _ = fit_surface(r.campaign, coordinates, u_surface=r.settings.u_surface)
-    assert set(half.others) == set(hidden)
+    assert set(half.missing) == set(hidden)
     error = half.fit.translation - whole.fit.translation
     square = error @ np.linalg.solve(half.fit.covariance[:3, :3], error)
     assert square < chi2.isf(0.01, 3)
