@@ -56,6 +56,7 @@ class Outcome:
     candidates   explanations of contradictions, and implausible records
     alarms     these, doubts, and the reason of a verdict that is not good
     errors     None where it was refused
+    checked    errors without the listed points
     listed     points listed as unchecked or unmeasured: their independent lines
     across     the same points: lines within 60° of the direction that has the fewest
     places     points that the night has
@@ -70,11 +71,17 @@ class Outcome:
     candidates: tuple[str, ...]
     alarms: tuple[str, ...]
     errors: Errors | None
+    checked: Errors | None
     listed: dict[str, int]
     across: dict[str, int]
     places: int
     seconds: float
     texts: tuple[str, ...] = field(default=(), repr=False)
+
+    @property
+    def claimed(self) -> Errors | None:
+        """Errors of the points whose uncertainties count: where the list has what is far, of the others."""
+        return self.checked if self.word == UNCHECKED else self.errors
 
 
 def rarity(square: float, weights: np.ndarray) -> float:
@@ -171,6 +178,7 @@ def outcome(case: Case, adjust=reduce_epoch) -> Outcome:
                 candidates=(),
                 alarms=(text,),
                 errors=None,
+                checked=None,
                 listed={},
                 across={},
                 places=0,
@@ -190,8 +198,8 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
     if case.shots:
         said += [f"{shots[shot]}: {reason}" for shot, reason in reduction.rejected.items()]
     listed = {*coordinates.unchecked, *coordinates.unmeasured}
-    errors, others = errors_of(reduction, truth), errors_of(reduction, truth, listed)
-    word = _word(case, said, errors, others, alarmed=reduction.verdict.word != "good" or bool(candidates))
+    errors, checked = errors_of(reduction, truth), errors_of(reduction, truth, listed)
+    word = _word(case, said, errors, checked, alarmed=reduction.verdict.word != "good" or bool(candidates))
     common = [f"{r.record} {r.where}" for r in coordinates.records if r.unchecked and r.in_common]
     if word in (DOUBTFUL, SILENT) and case.lies and all(any(re.search(p, t) for t in common) for p in case.named):
         word = UNCHECKED  # a record of all that the report lists as checked by nothing
@@ -211,6 +219,7 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
         candidates=tuple(candidates),
         alarms=tuple(dict.fromkeys(alarms)),
         errors=errors,
+        checked=checked,
         listed={n: int(lines.get(n, 0)) for n in sorted(listed)},
         across={n: lines_across(n, coordinates) for n in sorted(listed)},
         places=len([n for n in coordinates.points if n in coordinates.places]) + len(coordinates.unmeasured),
@@ -219,14 +228,14 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
     )
 
 
-def _word(case: Case, said: list[str], errors: Errors, others: Errors, *, alarmed: bool) -> str:
+def _word(case: Case, said: list[str], errors: Errors, checked: Errors, *, alarmed: bool) -> str:
     """Word of a night that was reduced.
 
-    others    errors without the points that are listed
+    checked   errors without the points that are listed
     alarmed   whether the verdict is doubtful or candidates are listed
     """
     hits = [any(re.search(pattern, text) for text in said) for pattern in case.named]
-    within, besides = not errors.far, not others.far
+    within, besides = not errors.far, not checked.far
     if case.lies and all(hits) and (besides or not case.covers):
         return NAMED
     if within:

@@ -46,13 +46,15 @@ def outcomes(some: list[Case], jobs: int = 1) -> Iterable[Outcome]:
 def row_of(name: str, found: list[Outcome]) -> dict:
     """Counts and errors of a row's nights.
 
-    mean_square   of the worst class, over the nights that were reduced and are not named
+    mean_square   of the worst class, over the nights that were reduced and are not named; without listed points where
+                  the list is the answer
     worst_class   that class
     """
     reduced = [o for o in found if o.errors is not None]
     unnamed = [o for o in reduced if o.word != "named"]
-    classes = {kind for o in unnamed for kind in o.errors.mean}
-    means = {kind: float(np.mean([o.errors.mean[kind] for o in unnamed if kind in o.errors.mean])) for kind in classes}
+    claims = [o.claimed.mean for o in unnamed]
+    classes = {kind for mean in claims for kind in mean}
+    means = {kind: float(np.mean([mean[kind] for mean in claims if kind in mean])) for kind in classes}
     worst = max(means, key=means.__getitem__, default="")
     listed, places = sum(len(o.listed) for o in found), sum(o.places for o in found)
     return {
