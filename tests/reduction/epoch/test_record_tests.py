@@ -320,7 +320,7 @@ def test_the_datum_of_a_survey_is_unchecked_and_never_blamed(records):
     rows, _ = record_tests(records)
     datum = [row for row in rows if row.record.removesuffix(" alike") in DATUM]
     assert {row.record.removesuffix(" alike") for row in datum} == DATUM
-    assert all(row.unchecked for row in datum)
+    assert all(row.unchecked and np.isnan(row.w) and np.isinf(row.detectable) for row in datum)
     assert not [h for h in records.rivals if h.key.of in DATUM]
 
 

@@ -292,14 +292,21 @@ def record_tests(records: EpochRecords) -> tuple[tuple[RecordTest, ...], tuple[G
     rows += [_alone(h, records) for h in many]
     groups = []
     for group in dict.fromkeys(h.key.group for h in few):
-        at = np.concatenate([tests.patterns.columns(i) for i, h in enumerate(few) if h.key.group is group])
+        tested = [i for i, h in enumerate(few) if h.key.group is group and h.key.of not in DATUM]
+        at = np.concatenate([tests.patterns.columns(i) for i in tested])
         fit = tests.fit_of(at)
         groups.append(GroupTest(group, fit.gain, fit.degrees, float(chdtrc(max(fit.degrees, 1), max(fit.gain, 0.0)))))
     return (*rows, *_typed(records)), tuple(groups)
 
 
 def _rows(hypothesis: Hypothesis, tests: PatternTests, at: np.ndarray, records: EpochRecords) -> list[RecordTest]:
-    """Tests of a record's numbers; of a movement, or of parameters, together, of others each by itself."""
+    """Tests of a record's numbers; of a movement, or of parameters, together, of others each by itself.
+
+    A survey's datum is tested by nothing: typed positions have it too, but a posture moves these alike.
+    """
+    if hypothesis.key.of in DATUM:
+        parts = enumerate(hypothesis.parts)
+        return [_row(hypothesis, part, _stated(hypothesis, k, records), np.nan, np.inf, 0.0) for k, part in parts]
     together = _parameter_fit(records, hypothesis)
     if together is None and hypothesis.key.group is RecordGroup.MOVEMENTS:
         together = tests.fit_of(at)
