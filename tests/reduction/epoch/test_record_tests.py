@@ -317,11 +317,13 @@ def test_an_error_that_many_records_share_is_one_contradiction(few_01, reduced_f
 
 def test_the_datum_of_a_survey_is_unchecked_and_never_blamed(records):
     """No range shows where a whole survey is, or where it points: only positions that somebody typed."""
-    rows, _ = record_tests(records)
+    rows, groups = record_tests(records)
     datum = [row for row in rows if row.record.removesuffix(" alike") in DATUM]
     assert {row.record.removesuffix(" alike") for row in datum} == DATUM
     assert all(row.unchecked and np.isnan(row.w) and np.isinf(row.detectable) for row in datum)
     assert not [h for h in records.rivals if h.key.of in DATUM]
+    (degrees,) = [g.degrees for g in groups if g.group is RecordGroup.COMMON]
+    assert degrees <= sum(np.isfinite(row.w) for row in rows if row.group is RecordGroup.COMMON)
 
 
 def test_a_drifting_feed_arm_is_a_movement(few_01, reduced_few_01):
