@@ -90,6 +90,20 @@ def test_a_prism_in_inches_is_named_and_its_shots_are_left_out(night_01):
     assert sorted(campaign.doubted) == sorted(own)
 
 
+def test_a_prism_off_the_dish_in_no_unit_is_named_without_one(night_01):
+    """Any place, taken for micrometres, is at the vertex and so on the paraboloid."""
+    x, y, z = night_01.targets["DP010"].position_mm
+    _, (found,) = plausible_campaign(edited(night_01, "targets", "DP010", position_mm=(x, y, z + 1000.0)))
+    assert found.text == "DP010 is 1 m off the dish's paraboloid; its shots are left out"
+    _, (found,) = plausible_campaign(edited(night_01, "targets", "DP010", position_mm=(1e3 * x, 1e3 * y, 1e3 * z)))
+    assert "looks like micrometres" in found.text
+
+
+def test_another_focal_length_is_no_other_unit(night_01):
+    with pytest.raises(InputError, match=r"focal length 54000 mm; set positions or paraboloid right"):
+        plausible_campaign(of_site(night_01, "paraboloid", focal_length_mm=54_000.0))
+
+
 def test_a_prism_typed_100_mm_off_is_left_to_the_ranges(night_01):
     x, y, z = night_01.targets["DP010"].position_mm
     assert implausible_records(edited(night_01, "targets", "DP010", position_mm=(x, y, z + 100.0))) == ()

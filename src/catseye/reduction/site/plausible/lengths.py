@@ -153,8 +153,13 @@ def _off_paraboloid(target: TargetRow, focal_length_mm: float, factor: float = 1
 
 
 def _unit_of(target: TargetRow, focal_length_mm: float) -> str:
-    fits = (u for u, f in UNITS_MM.items() if abs(_off_paraboloid(target, focal_length_mm, f)) < _limit_m(target))
-    return next(fits, "")
+    """Unit in which a prism lies on the paraboloid, off its vertex, where any small length does; "" for none."""
+    limit = _limit_m(target)
+    for unit, factor in UNITS_MM.items():
+        depth = factor * target.position_mm[2] * MILLIMETRE
+        if abs(_off_paraboloid(target, focal_length_mm, factor)) < limit < abs(depth):
+            return unit
+    return ""
 
 
 def _all_in(dish: list[TargetRow], focal_length_mm: float) -> str:
