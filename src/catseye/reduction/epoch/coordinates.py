@@ -298,7 +298,7 @@ def coordinates_of(settled: SettledNetwork, *, resolved: Resolved, with_records:
         status=solution.status,
         fits=solution.fits,
         notes=(
-            *record_notes(network, solution, wrong, count),
+            *record_notes(network, solution, wrong, count, independence),
             *([leaning.note] if leaning is not None else []),
             *sound_notes(network, solution, ranges, sound),
             *loss_notes(ranges, independence, network.settings.critical),

@@ -176,12 +176,17 @@ def disagreements(network: CampaignNetwork) -> list[str]:
 
 
 def record_notes(
-    network: CampaignNetwork, solution: LeastSquaresSolution, contradicted: list[str], count: dict[str, int]
+    network: CampaignNetwork,
+    solution: LeastSquaresSolution,
+    contradicted: list[str],
+    count: dict[str, int],
+    independence: Independence,
 ) -> list[str]:
     """Notes on the records, one line each.
 
     contradicted   result of `wrong_records`
     count          used shots at each point
+    independence   of the lines at each point: those that check nothing may be wrong as well as a typed position
     """
     notes = list(contradicted)
     notes += network.allowance.texts
@@ -197,14 +202,18 @@ def record_notes(
     moved = np.array([np.linalg.norm(solution.x[network.layout.columns(n)] - network.places[n].start) for n in typed])
     unit = network.campaign.triplet_of
     usual = float(np.median(moved)) / 1.538 if len(moved) > 5 else np.inf  # median of chi with 3 degrees of freedom
-    wrong = {
-        unit.get(n, n): d
+    far = {
+        unit.get(n, n): (d / MILLIMETRE, independence.by_lines(n))
         for n, d in zip(typed, moved, strict=True)
         if d > 4.0 * max(usual, network.places[n].u_start or 0.0)
     }
+    others = np.median(moved) / MILLIMETRE if far else 0.0
     notes += [
-        f"{n}: its typed position is {d / MILLIMETRE:.0f} mm off, the others' some {np.median(moved) / MILLIMETRE:.0f}"
-        for n, d in wrong.items()
+        f"{n}: {d:.0f} mm from its typed position, the others some {others:.0f}, by lines that do not check each "
+        "other: either may be wrong"
+        if unchecked
+        else f"{n}: its typed position is {d:.0f} mm off, the others' some {others:.0f}"
+        for n, (d, unchecked) in far.items()
     ]
     return notes
 

@@ -89,6 +89,17 @@ def test_repeats_on_three_lines_check_nothing(few_01, reduced_few_01):
     assert "ZEG41040L" not in reduced_few_01.coordinates.unchecked
 
 
+@pytest.mark.parametrize(("lines", "said"), [(3, "either may be wrong"), (9, "its typed position is")])
+def test_lines_that_check_each_other_alone_accuse_a_typed_position(few_01, reduced_few_01, lines, said):
+    rangers, target = rangers_of(reduced_few_01, "ZEG41040L"), few_01.targets["ZEG41040L"]
+    typed = target.model_copy(update={"position_mm": tuple(np.add(target.position_mm, [0.0, 60.0, 0.0]))})
+    wrong = replace(few_01, targets={**few_01.targets, "ZEG41040L": typed})
+    coordinates = reduce_epoch(without_lines(wrong, "ZEG41040L", *rangers[lines:])).coordinates
+    (note,) = [n for n in coordinates.notes if n.startswith("ZEG41040L: ") and "typed position" in n]
+    assert said in note
+    assert ("ZEG41040L" in coordinates.unchecked) == (lines == 3)
+
+
 def test_an_unchecked_prism_shapes_no_surface_while_there_are_others(night_01, reduced_night_01):
     rangers = rangers_of(reduced_night_01, "DP012")
     reduction = reduce_epoch(without_lines(night_01, "DP012", *rangers[3:]))
