@@ -99,6 +99,22 @@ def test_a_prism_off_the_dish_in_no_unit_is_named_without_one(night_01):
     assert "looks like micrometres" in found.text
 
 
+def test_many_prisms_off_the_dish_are_one_record_for_each_unit(night_01):
+    campaign = night_01
+    for k in range(10, 20):
+        x, y, z = campaign.targets[f"DP0{k}"].position_mm
+        off = (x, y, z + 100.0 * k) if k < 18 else (x / 25.4, y / 25.4, z / 25.4)
+        campaign = edited(campaign, "targets", f"DP0{k}", position_mm=off)
+    doubted, found = plausible_campaign(campaign)
+    assert [record.text for record in found] == [
+        "DP010, DP011, DP012, DP013, DP014, DP015 and 2 more are up to 1.7 m off the dish's paraboloid; their shots "
+        "are left out",
+        "DP018 and DP019 are up to 0.45 m off the dish's paraboloid: looks like inches; their shots are left out",
+    ]
+    shots = zip(campaign.shots.shot, campaign.shots.target, strict=True)
+    assert sorted(doubted.doubted) == sorted(s for s, t in shots if t in {f"DP0{k}" for k in range(10, 20)})
+
+
 def test_another_focal_length_is_no_other_unit(night_01):
     with pytest.raises(InputError, match=r"focal length 54000 mm; set positions or paraboloid right"):
         plausible_campaign(of_site(night_01, "paraboloid", focal_length_mm=54_000.0))

@@ -132,14 +132,21 @@ def _prisms(campaign: Campaign) -> tuple[Campaign, list[ImplausibleRecord]]:
         )
         where = "targets.toml: position_mm"
         return campaign, [ImplausibleRecord(where, text, "position", tuple(off), fatal=True)]
-    implausible, doubts = [], dict(campaign.doubted)
-    for name, distance in off.items():
-        unit = _unit_of(campaign.targets[name], shape.focal_length_mm)
+    by_unit: dict[str, list[str]] = {}
+    for name in off:
+        by_unit.setdefault(_unit_of(campaign.targets[name], shape.focal_length_mm), []).append(name)
+    implausible: list[ImplausibleRecord] = []
+    reasons: dict[str, str] = {}
+    for unit, names in by_unit.items():
+        one, largest = len(names) == 1, max(abs(off[name]) for name in names)
+        far = f"{names[0]} is" if one else f"{listed(tuple(names))} are up to"
         guess = f": looks like {unit}" if unit else ""
-        text = f"{name} is {abs(distance):.2g} m off the dish's paraboloid{guess}; its shots are left out"
-        implausible.append(ImplausibleRecord("targets.toml: position_mm", text, "position", (name,)))
-        doubts |= {int(s): text for s, t in zip(campaign.shots.shot, campaign.shots.target, strict=True) if t == name}
-    return replace(campaign, doubted=doubts), implausible
+        text = f"{far} {largest:.2g} m off the dish's paraboloid{guess}; {'its' if one else 'their'} shots are left out"
+        implausible.append(ImplausibleRecord("targets.toml: position_mm", text, "position", tuple(names)))
+        reasons |= dict.fromkeys(names, text)
+    shots = zip(campaign.shots.shot, campaign.shots.target, strict=True)
+    doubts = {int(s): reasons[t] for s, t in shots if t in reasons}
+    return replace(campaign, doubted=dict(campaign.doubted) | doubts), implausible
 
 
 def _limit_m(target: TargetRow) -> float:
