@@ -61,6 +61,8 @@ class Outcome:
     across     the same points: lines within 60° of the direction that has the fewest
     places     points that the night has
     seconds    of the processor
+    texts      all that was said
+    faulty     target that the night types 30 mm off besides, as every one does
     """
 
     case: Case
@@ -77,6 +79,7 @@ class Outcome:
     places: int
     seconds: float
     texts: tuple[str, ...] = field(default=(), repr=False)
+    faulty: str | None = None
 
     @property
     def claimed(self) -> Errors | None:
@@ -225,6 +228,7 @@ def _judged(case: Case, truth, reduction, seconds: float) -> Outcome:
         places=len([n for n in coordinates.points if n in coordinates.places]) + len(coordinates.unmeasured),
         seconds=seconds,
         texts=tuple(dict.fromkeys((*said, *notes))),
+        faulty=truth.wrongly_typed,
     )
 
 

@@ -118,9 +118,10 @@ def test_what_is_listed_of_an_honest_night_has_too_few_lines(honest):
 def test_no_words_of_honest_nights_name_a_lie(honest):
     """Or an outcome would count as named whatever is said."""
     for o in honest:
+        texts = [text for text in o.texts if not text.startswith(f"{o.faulty}: its typed position is")]
         for name in SINGLES:
             wrong = case(name, o.case.seed, 1.0)
-            found = [text for text in o.texts if text in o.alarms or not text.startswith(UNSURE)]
+            found = [text for text in texts if text in o.alarms or not text.startswith(UNSURE)]
             said = [text for text in found for pattern in wrong.named if re.search(pattern, text)]
             assert not said, f"{o.case.seed}, {name}: {said}"
 
