@@ -196,23 +196,16 @@ def test_the_variance_factor_of_each_of_a_few_nights_is_near_one(few):
         assert 0.65 < night["factor"] < 1.35
 
 
-# These nights have no waves of the air, which the uncertainties allow for. With what the ranges lean to, claims are
-# wider than needed: of 60 prisms 0.66 (feed arm) to 0.98, 0.78 of the pose, 0.93 of the shots; of 400 prisms 0.57
-# (feed arm) to 0.81, 0.51 of the pose, 0.95. Natural nights decide whether they are right, see test_natural_nights.
-QUIET = 0.5
-QUIET_FACTORS = 0.9, 1.05
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", INDEPENDENT)
 def test_claimed_uncertainties_are_those_of_many_nights(many, kind):
     mean, _ = summary(many)[kind]
-    assert QUIET < mean < 1.25
+    assert 0.8 < mean < 1.25
 
 
 @pytest.mark.slow
 def test_the_poses_covariance_is_that_of_many_nights(many):
-    assert QUIET < np.mean([n["pose"] for n in many]) / 5.0 < 1.25
+    assert 0.8 < np.mean([n["pose"] for n in many]) / 5.0 < 1.25
 
 
 @pytest.mark.slow
@@ -224,8 +217,8 @@ def test_bad_shots_are_rejected_for_the_right_reason_and_good_ones_kept_in_many_
 def test_the_variance_factor_of_each_of_many_nights_is_near_one(many):
     factors = np.array([n["factor"] for n in many])
     assert np.all((factors > 0.65) & (factors < 1.35))
-    # 390 degrees of freedom: 7 % a night
-    assert QUIET_FACTORS[0] < factors.mean() < QUIET_FACTORS[1]
+    # 390 degrees of freedom: 7 % a night; the start of a factor below one would be a sigma claimed too large
+    assert factors.mean() == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.fixture(scope="module")
@@ -248,9 +241,9 @@ def sound(large):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", INDEPENDENT)
 def test_claimed_uncertainties_are_those_of_large_nights(sound, kind):
-    _, high = expected_interval(INDEPENDENT[kind], len(sound))
+    low, high = expected_interval(INDEPENDENT[kind], len(sound))
     mean, _ = summary(sound)[kind]
-    assert QUIET < mean < high
+    assert low < mean < high
 
 
 @pytest.mark.slow
@@ -259,20 +252,20 @@ def test_joint_covariances_are_those_of_large_nights(sound, kind):
     """Single coordinates hang on the datum's few errors; together, each error counts once."""
     means = [n["whitened"][kind] for n in sound]
     u = np.std(means, ddof=1) / np.sqrt(len(means))
-    assert QUIET < np.mean(means) < 1.1 + 2.0 * u
+    assert 0.9 - 2.0 * u < np.mean(means) < 1.1 + 2.0 * u
 
 
 @pytest.mark.slow
 def test_the_surface_and_the_poses_covariance_are_those_of_large_nights(sound):
     assert 0.9 < summary(sound)["surface"][0] < 1.1
-    _, high = expected_interval(5, len(sound))
-    assert QUIET < np.mean([n["pose"] for n in sound]) / 5.0 < high
+    low, high = expected_interval(5, len(sound))
+    assert low < np.mean([n["pose"] for n in sound]) / 5.0 < high
 
 
 @pytest.mark.slow
 def test_bad_shots_of_large_nights_are_rejected_for_the_right_reason_and_good_ones_kept(large):
     judge_shots(large)
-    assert QUIET_FACTORS[0] < np.mean([n["factor"] for n in large]) < QUIET_FACTORS[1]
+    assert np.mean([n["factor"] for n in large]) == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_point_where_good_shots_lose_against_a_foreign_one_claims_little(tmp_path):

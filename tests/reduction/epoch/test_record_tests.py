@@ -326,6 +326,14 @@ def test_the_datum_of_a_survey_is_unchecked_and_never_blamed(records):
     assert degrees <= sum(np.isfinite(row.w) for row in rows if row.group is RecordGroup.COMMON)
 
 
+def test_a_monument_that_is_held_tests_where_the_others_are(few_01, reduced_few_01):
+    held = few_01.monuments["ZY103"].model_copy(update={"u_x_mm": 0.0, "u_y_mm": 0.0})
+    campaign = replace(few_01, monuments={**few_01.monuments, "ZY103": held})
+    rows = adjusted(campaign, reduced_few_01).records
+    tested = {row.record.removesuffix(" alike"): row.w for row in rows if np.isfinite(row.w)}
+    assert set(tested) & DATUM == {"places of all monuments", "directions of all monuments"}
+
+
 def test_a_drifting_feed_arm_is_a_movement(few_01, reduced_few_01):
     """2 mm/h upwards, written into the phases of shots from the ground; the arm's rangers see the dish sink."""
     r, shots = reduced_few_01, few_01.shots

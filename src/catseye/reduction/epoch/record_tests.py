@@ -39,7 +39,7 @@ from catseye.reduction.epoch.contradictions.hypotheses import (
     patterns_of,
     range_hypotheses,
 )
-from catseye.reduction.epoch.contradictions.in_common import DATUM, record_hypotheses
+from catseye.reduction.epoch.contradictions.in_common import DATUM, HEIGHTS, record_hypotheses
 from catseye.reduction.epoch.parameter import XYZ, ParameterKind
 from catseye.reduction.epoch.prior_names import APPROXIMATE
 from catseye.reduction.epoch.shots import ShotGroup, ShotParts
@@ -113,6 +113,15 @@ class EpochRecords:
             [len(fit.active) for fit in fits],
             np.concatenate([fit.active for fit in fits]),
         )
+
+    @cached_property
+    def untested(self) -> frozenset[str]:
+        """Errors in common that nothing tests: a survey's datum, where no monument is held horizontally.
+
+        Typed positions have the datum too, but a posture moves these alike.
+        """
+        held = any(0.0 in (m.u_x_mm, m.u_y_mm) for m in self.network.campaign.monuments.values())
+        return frozenset((HEIGHTS,)) if held else DATUM
 
     @property
     def rivals(self) -> list[Hypothesis]:
@@ -291,20 +300,17 @@ def record_tests(records: EpochRecords) -> tuple[tuple[RecordTest, ...], tuple[G
     rows = [row for i, h in enumerate(few) for row in _rows(h, tests, tests.patterns.columns(i), records)]
     rows += [_alone(h, records) for h in many]
     groups = []
-    for group in dict.fromkeys(h.key.group for h in few):
-        tested = [i for i, h in enumerate(few) if h.key.group is group and h.key.of not in DATUM]
-        at = np.concatenate([tests.patterns.columns(i) for i in tested])
+    tested = [(i, h.key.group) for i, h in enumerate(few) if h.key.of not in records.untested]
+    for group in dict.fromkeys(group for _, group in tested):
+        at = np.concatenate([tests.patterns.columns(i) for i, own in tested if own is group])
         fit = tests.fit_of(at)
         groups.append(GroupTest(group, fit.gain, fit.degrees, float(chdtrc(max(fit.degrees, 1), max(fit.gain, 0.0)))))
     return (*rows, *_typed(records)), tuple(groups)
 
 
 def _rows(hypothesis: Hypothesis, tests: PatternTests, at: np.ndarray, records: EpochRecords) -> list[RecordTest]:
-    """Tests of a record's numbers; of a movement, or of parameters, together, of others each by itself.
-
-    A survey's datum is tested by nothing: typed positions have it too, but a posture moves these alike.
-    """
-    if hypothesis.key.of in DATUM:
+    """Tests of a record's numbers; of a movement, or of parameters, together, of others each by itself."""
+    if hypothesis.key.of in records.untested:
         parts = enumerate(hypothesis.parts)
         return [_row(hypothesis, part, _stated(hypothesis, k, records), np.nan, np.inf, 0.0) for k, part in parts]
     together = _parameter_fit(records, hypothesis)
